@@ -1,0 +1,332 @@
+"""The cracked function space: the only place that knows how the sides of a crack get their own dofs.
+
+A crack is a set of interior facets of a conforming mesh. It is opened in the function space, not in the mesh:
+each dof on the crack is copied once for every part into which the crack divides the cells around it. So
+``u('+') - u('-')`` is the jump on the crack, and the mesh, its tags and its output stay as they are.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import basix
+import numpy as np
+from dolfinx import cpp, fem, graph, la
+from dolfinx.common import IndexMap, timed
+from dolfinx.mesh import Mesh, compute_midpoints
+from mpi4py import MPI
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+Facets = NDArray[np.int32] | Sequence[NDArray[np.int32]]
+
+_TANGENT = 1e-3  # |n·e| below which the side of a facet cannot be told from the direction e
+
+
+@timed("~cutsim: cracked space")
+def cracked_space(mesh: Mesh, element: Any, facets: Facets) -> fem.FunctionSpace:
+    """Lagrange space of degree 1 or 2, discontinuous across a crack and continuous elsewhere. Collective.
+
+    Two cells share their dof at a point of the crack if one can walk from one to the other around that point
+    through facets that contain it and are not cracked. This alone separates bodies, keeps the dofs of a front
+    that ends inside a body shared, and makes three copies where cracks meet in a T, four where they cross.
+
+    Sub-spaces can be constrained as usual, but ``V.sub(i).collapse()`` rebuilds a dofmap from the mesh and so
+    closes the crack: make a scalar cracked space instead.
+
+    Args:
+        mesh: The mesh; on several ranks with ghost mode ``shared_facet``.
+        element: What ``dolfinx.fem.functionspace`` takes: ``("Lagrange", degree)``,
+            ``("Lagrange", degree, shape)`` or a basix.ufl element; scalar or blocked.
+        facets: Facets of the crack, or one array for each of several cracks: local indices, owned or ghosts.
+            A facet may be given on any of the ranks that know it.
+
+    Returns:
+        The space on ``mesh``. Its owned dofs are those away from the crack, in the order of the uncracked
+        space, then the copies on the crack.
+
+    Raises:
+        ValueError: On all ranks, if the element is not continuous Lagrange of degree 1 or 2, a facet index is
+            out of range, there are no facets, some lie on the outer boundary, or ghost cells are missing.
+    """
+    cracked = _crack_marks(mesh, facets)
+    parent = fem.functionspace(mesh, element)
+    _check_element(parent.ufl_element())
+    incidence = _incidence(mesh, parent, cracked)
+    dofs, owners = _split_dofs(parent, incidence, _copies(mesh.comm, incidence))
+    index_map, local_dofs = _renumber(mesh.comm, dofs, owners)
+    dofmap = cpp.fem.DofMap(
+        parent.dofmap.dof_layout,
+        index_map,
+        parent.dofmap.index_map_bs,
+        graph.adjacencylist(local_dofs),
+        parent.dofmap.bs,
+    )
+    space = type(parent._cpp_object)(mesh._cpp_object, parent.element, dofmap, parent.value_shape)
+    return fem.FunctionSpace(mesh, parent.ufl_element(), space)
+
+
+def crack_measure_entities(
+    mesh: Mesh, facets: Facets, plus: NDArray[np.int32] | Sequence[float]
+) -> NDArray[np.int32]:
+    """Integration data of the crack with a fixed '+' side. Collective.
+
+    The sides that dolfinx gives interior facets follow the cell numbers and so change with the partition. Use
+    ``ufl.Measure("dS", domain=mesh, subdomain_data=[(tag, entities)])`` to have '+' where you want it.
+
+    Args:
+        mesh: The mesh; on several ranks with ghost mode ``shared_facet``.
+        facets: Facets of the crack, as for `cracked_space`.
+        plus: The '+' side: an integer array of the local cells (owned or ghosts) of the region on that side,
+            or a direction e of gdim floats such that the normal n out of the '+' cell has n·e > 0.
+
+    Returns:
+        Rows (cell '+', its local facet, cell '-', its local facet), flattened, one for each facet owned by
+        this rank.
+
+    Raises:
+        ValueError: On all ranks, if the facets are refused as in `cracked_space`, if both cells of a facet or
+            neither are in the '+' region, or if the direction is not a vector or is tangent to a facet.
+    """
+    cracked = np.flatnonzero(_crack_marks(mesh, facets)[: _facet_map(mesh).size_local])
+    cells, local_facets = _cells_of(mesh, cracked)
+    if isinstance(plus, np.ndarray) and np.issubdtype(plus.dtype, np.integer):
+        first = _in_region(mesh, cracked, cells, plus)
+    else:
+        first = _along(mesh, cracked, cells, np.asarray(plus, dtype=np.float64))
+    rows = np.stack([cells, local_facets], axis=2)
+    return np.where(first[:, None, None], rows, rows[:, ::-1]).ravel()
+
+
+# --- the crack in the mesh ---
+
+
+def _refuse(comm: MPI.Comm, message: str | None) -> None:
+    """Raise the message of the lowest rank that has one, on all ranks."""
+    if told := [m for m in comm.allgather(message) if m]:
+        raise ValueError(told[0])
+
+
+def _sum_over_ranks(index_map: IndexMap, values: NDArray[Any]) -> NDArray[np.int32]:
+    """Sum of the values that the ranks hold for each index, returned to all of them."""
+    total = la.vector(index_map, dtype=np.int32)
+    total.array[:] = values
+    total.scatter_reverse(la.InsertMode.add)
+    total.scatter_forward()
+    return total.array.copy()
+
+
+def _facet_map(mesh: Mesh) -> IndexMap:
+    mesh.topology.create_entities(mesh.topology.dim - 1)
+    return mesh.topology.index_map(mesh.topology.dim - 1)
+
+
+def _cell_facets(mesh: Mesh) -> NDArray[np.int32]:
+    """Facets of every local cell, shape (cells, facets of a cell)."""
+    tdim = mesh.topology.dim
+    mesh.topology.create_connectivity(tdim - 1, tdim)  # for the midpoints and normals of facets
+    mesh.topology.create_connectivity(tdim, tdim - 1)
+    table = mesh.topology.connectivity(tdim, tdim - 1)
+    return table.array.reshape(table.num_nodes, -1)
+
+
+def _marks(comm: MPI.Comm, index_map: IndexMap, indices: NDArray[np.int32], name: str) -> NDArray[np.bool_]:
+    """Whether any rank names the index, for all local indices."""
+    size = index_map.size_local + index_map.num_ghosts
+    bad = indices[(indices < 0) | (indices >= size)]
+    text = f"{name}: {bad.size} indices out of range, e.g. {bad[:1]}; allowed are 0 to {size - 1}"
+    _refuse(comm, text if bad.size else None)
+    named = np.zeros(size, dtype=np.int32)
+    named[indices] = 1
+    return _sum_over_ranks(index_map, named) > 0
+
+
+def _crack_marks(mesh: Mesh, facets: Facets) -> NDArray[np.bool_]:
+    """Whether each local facet is cracked, after all checks of the facets and the ghost mode."""
+    comm, index_map = mesh.comm, _facet_map(mesh)
+    parts = [facets] if isinstance(facets, np.ndarray) else list(facets)
+    given = np.concatenate([np.empty(0, np.int32), *(np.asarray(p, dtype=np.int32).ravel() for p in parts)])
+    cracked = _marks(comm, index_map, given, "facets")
+    if comm.allreduce(int(cracked.sum())) == 0:
+        raise ValueError("facets: 0 on all ranks; allowed is at least 1 interior facet")
+
+    cell_facets = _cell_facets(mesh)
+    owned = cell_facets[: mesh.topology.index_map(mesh.topology.dim).size_local]
+    cells_here = np.bincount(cell_facets.ravel(), minlength=cracked.size)
+    cells_everywhere = _sum_over_ranks(index_map, np.bincount(owned.ravel(), minlength=cracked.size))
+    hidden = int(np.sum(cells_here[np.unique(owned)] < cells_everywhere[np.unique(owned)]))
+    if total := comm.allreduce(hidden):
+        raise ValueError(
+            f"mesh: {total} facets between ranks lack a ghost cell; on {comm.size} ranks make the mesh with "
+            "partitioner=dolfinx.mesh.create_cell_partitioner(dolfinx.mesh.GhostMode.shared_facet)"
+        )
+    outer = np.flatnonzero(cracked & (cells_everywhere == 1)).astype(np.int32)
+    text = "facets: {} lie on the outer boundary, e.g. at {}; allowed are interior facets"
+    _refuse_facets(mesh, outer, text)
+    return cracked
+
+
+def _refuse_facets(mesh: Mesh, bad: NDArray[np.int32], text: str) -> None:
+    """Refuse the facets, if any, with their number over all ranks and the midpoint of one of them."""
+    count = mesh.comm.allreduce(int(np.sum(bad < _facet_map(mesh).size_local)))
+    where = compute_midpoints(mesh, mesh.topology.dim - 1, bad[:1]).reshape(-1, 3).round(6).tolist()
+    _refuse(mesh.comm, text.format(count, where[0]) if bad.size else None)
+
+
+# --- the sides of the crack ---
+
+
+def _cells_of(mesh: Mesh, facets: NDArray[Any]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The two cells of each facet and its local number in them, each of shape (facets, 2)."""
+    row = np.full(_facet_map(mesh).size_local + _facet_map(mesh).num_ghosts, -1, dtype=np.int32)
+    row[facets] = np.arange(facets.size)
+    cell_facets = _cell_facets(mesh)
+    cells, local = np.nonzero(row[cell_facets] >= 0)
+    order = np.argsort(row[cell_facets[cells, local]], kind="stable")
+    pairs = np.stack([cells[order], local[order]], dtype=np.int32).reshape(2, -1, 2)
+    return pairs[0], pairs[1]
+
+
+def _in_region(
+    mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], plus: NDArray[np.int32]
+) -> NDArray[np.bool_]:
+    """Whether the first cell of each facet is the one in the region."""
+    inside = _marks(mesh.comm, mesh.topology.index_map(mesh.topology.dim), plus.ravel(), "plus")[cells]
+    wrong = facets[inside[:, 0] == inside[:, 1]].astype(np.int32)
+    text = "plus: {} facets have both cells or neither in the '+' region, e.g. at {}; allowed is exactly one"
+    _refuse_facets(mesh, wrong, text)
+    return inside[:, 0]
+
+
+def _along(
+    mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], direction: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Whether the normal out of the first cell of each facet points along the direction."""
+    tdim, gdim, facets = mesh.topology.dim, mesh.geometry.dim, facets.astype(np.int32)
+    sound = direction.shape == (gdim,) and np.all(np.isfinite(direction)) and np.any(direction)
+    message = f"plus: {direction.tolist()} is no direction; allowed are {gdim} finite floats, not all zero"
+    _refuse(mesh.comm, None if sound else message)
+    normals = cpp.mesh.cell_normals(mesh._cpp_object, tdim - 1, facets).reshape(-1, 3)
+    first = np.ascontiguousarray(cells[:, 0], dtype=np.int32)
+    outward = compute_midpoints(mesh, tdim - 1, facets) - compute_midpoints(mesh, tdim, first)
+    normals *= np.sign(np.sum(normals * outward.reshape(-1, 3), axis=1, keepdims=True))
+    cosine = normals[:, :gdim] @ (direction / np.linalg.norm(direction))
+    text = (
+        f"plus: {direction.tolist()} is tangent to {{}} facets, e.g. at {{}}; allowed is |n·e| > {_TANGENT}"
+    )
+    _refuse_facets(mesh, facets[np.abs(cosine) <= _TANGENT], text)
+    return cosine > 0
+
+
+# --- dofs ---
+
+
+@dataclass(frozen=True)
+class _Incidence:
+    """Which cells meet in the dofs on the crack, on this rank. A key is one number for a (dof, cell) pair."""
+
+    cells: NDArray[np.int64]  # local cell of each node ...
+    places: NDArray[np.int64]  # ... place of the dof in that cell ...
+    keys: NDArray[np.int64]  # ... and key
+    owned: NDArray[np.bool_]  # whether this rank owns the cell of the node
+    links: NDArray[np.int64]  # pairs of keys joined by an uncracked facet, shape (links, 2)
+    marked: NDArray[np.bool_]  # whether each local dof of the parent space is on the crack
+
+
+@dataclass(frozen=True)
+class _Copies:
+    """The copies of the dofs on the crack, the same on all ranks."""
+
+    keys: NDArray[np.int64]  # all (dof, cell) keys, sorted ...
+    labels: NDArray[np.int64]  # ... and the copy that each belongs to
+    owners: NDArray[np.int32]  # rank that owns each copy
+
+
+def _check_element(element: Any) -> None:
+    lagrange = element.element_family == basix.ElementFamily.P and not element.discontinuous
+    if not (lagrange and element.degree in (1, 2)):
+        raise ValueError(f"element: {element}; allowed is continuous Lagrange of degree 1 or 2")
+
+
+def _incidence(mesh: Mesh, parent: fem.FunctionSpace, cracked: NDArray[np.bool_]) -> _Incidence:
+    tdim, dofmap, index_map = mesh.topology.dim, parent.dofmap, parent.dofmap.index_map
+    cell_dofs, cell_facets = dofmap.list, _cell_facets(mesh)
+    closure = np.array(
+        [dofmap.dof_layout.entity_closure_dofs(tdim - 1, i) for i in range(cell_facets.shape[1])]
+    )
+    cells, local = np.nonzero(cracked[cell_facets])
+    on_crack = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    on_crack[cell_dofs[cells[:, None], closure[local]]] = 1
+    marked = _sum_over_ranks(index_map, on_crack) > 0
+
+    cell_map = mesh.topology.index_map(tdim)
+    dof_number = index_map.local_to_global(np.arange(marked.size, dtype=np.int32))
+    cell_number = cell_map.local_to_global(np.arange(len(cell_dofs), dtype=np.int32))
+
+    def key(dofs: NDArray[Any], of: NDArray[Any]) -> NDArray[np.int64]:
+        return dof_number[dofs] * cell_map.size_global + cell_number[of]
+
+    cells, places = np.nonzero(marked[cell_dofs])
+    joints = np.unique(cell_facets[cells])
+    joints = joints[~cracked[joints] & (np.bincount(cell_facets.ravel())[joints] == 2)]
+    pairs, local_facets = _cells_of(mesh, joints)
+    shared = cell_dofs[pairs[:, :1], closure[local_facets[:, 0]]]
+    row, column = np.nonzero(marked[shared])
+    links = np.stack([key(shared[row, column], pairs[row, side]) for side in (0, 1)], axis=1)
+    return _Incidence(
+        cells, places, key(cell_dofs[cells, places], cells), cells < cell_map.size_local, links, marked
+    )
+
+
+def _copies(comm: MPI.Comm, incidence: _Incidence) -> _Copies:
+    """Gather the crack on every rank and number the connected parts around each dof."""
+    owned_keys = comm.allgather(incidence.keys[incidence.owned])
+    ranks = np.repeat(np.arange(comm.size, dtype=np.int32), [k.size for k in owned_keys])
+    order = np.argsort(np.concatenate(owned_keys))
+    keys, ranks = np.concatenate(owned_keys)[order], ranks[order]
+    first, second = np.searchsorted(keys, np.concatenate(comm.allgather(incidence.links))).T
+    adjacency = coo_array((np.ones(first.size, dtype=np.int8), (first, second)), shape=(keys.size, keys.size))
+    count, labels = connected_components(adjacency, directed=False)
+    owners = np.full(count, comm.size, dtype=np.int32)
+    np.minimum.at(owners, labels, ranks)
+    return _Copies(keys, labels, owners)
+
+
+def _split_dofs(
+    parent: fem.FunctionSpace, incidence: _Incidence, copies: _Copies
+) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Global number and owner of the dofs of every local cell, each of shape (cells, dofs of a cell)."""
+    comm, index_map, cell_dofs = parent.mesh.comm, parent.dofmap.index_map, parent.dofmap.list
+    kept = np.flatnonzero(~incidence.marked[: index_map.size_local])
+    kept_on = np.array(comm.allgather(kept.size))
+    copies_on = np.bincount(copies.owners, minlength=comm.size)
+    start = np.concatenate([[0], np.cumsum(kept_on + copies_on)])
+
+    number = la.vector(index_map, dtype=np.int64)
+    number.array[kept] = start[comm.rank] + np.arange(kept.size)
+    number.scatter_forward()
+    owner = np.concatenate([np.full(index_map.size_local, comm.rank), index_map.owners])
+    dofs, owners = number.array[cell_dofs], owner[cell_dofs]
+
+    by_owner = np.argsort(copies.owners, kind="stable")
+    within = np.empty_like(by_owner)
+    within[by_owner] = np.arange(by_owner.size) - (np.cumsum(copies_on) - copies_on)[copies.owners[by_owner]]
+    copy_number = start[copies.owners] + kept_on[copies.owners] + within
+    copy = copies.labels[np.searchsorted(copies.keys, incidence.keys)]
+    dofs[incidence.cells, incidence.places] = copy_number[copy]
+    owners[incidence.cells, incidence.places] = copies.owners[copy]
+    return dofs, owners.astype(np.int32)
+
+
+def _renumber(
+    comm: MPI.Comm, dofs: NDArray[np.int64], owners: NDArray[np.int32]
+) -> tuple[IndexMap, NDArray[np.int32]]:
+    """Index map with the dofs that other ranks own as ghosts, and the dofs in local numbers."""
+    here = owners == comm.rank
+    start, end = (dofs[here].min(), dofs[here].max() + 1) if here.any() else (0, 0)
+    ghosts, first, position = np.unique(dofs[~here], return_index=True, return_inverse=True)
+    index_map = IndexMap(comm, int(end - start), ghosts, owners[~here][first])
+    local = dofs - start
+    local[~here] = end - start + position
+    return index_map, local.astype(np.int32)
