@@ -1,0 +1,75 @@
+"""Everything that depends on the installed dolfinx: compiling forms, and the cache of compiled kernels."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+CACHE_DIR = Path(os.getenv("XDG_CACHE_HOME", Path.home() / ".cache")) / "cutsim"
+
+#: Options of every kernel compilation. Kernels are short dense loops, so vectorising them pays; NaN must survive,
+#: because a NaN residual is how an inverted element is recognised.
+JIT_OPTIONS: dict[str, Any] = {
+    "cffi_extra_compile_args": ["-O2", "-g0"],
+    "cache_dir": str(CACHE_DIR),
+    "timeout": 600,
+}
+
+
+def form(
+    form: ufl.Form,
+    *,
+    entity_maps: Mapping[Any, Any] | None = None,
+    jit_options: Mapping[str, Any] | None = None,
+    form_compiler_options: Mapping[str, Any] | None = None,
+) -> fem.Form:
+    """Compile a UFL form with the project's compiler options. Collective on the mesh of the form.
+
+    Args:
+        form: UFL form; every integral on one mesh.
+        entity_maps: For each further mesh, the map from entities of the integration mesh to its entities.
+        jit_options: Options that override `JIT_OPTIONS`.
+        form_compiler_options: Options of FFCx.
+
+    Returns:
+        The compiled form.
+    """
+    options = {**JIT_OPTIONS, **(jit_options or {})}
+    with jit_cache(form.ufl_domain().ufl_cargo().comm, Path(options["cache_dir"])):
+        return fem.form(
+            form,
+            entity_maps=None if entity_maps is None else dict(entity_maps),
+            jit_options=options,
+            form_compiler_options=dict(form_compiler_options or {}),
+        )
+
+
+@contextmanager
+def jit_cache(comm: MPI.Comm, directory: Path = CACHE_DIR) -> Iterator[None]:
+    """Hold the kernel cache alone while compiling, having removed what a killed process left half built.
+
+    A source file without its `.c.cached` mark makes the next compilation of the same form wait for a process
+    that is gone. Under the lock nobody else is compiling, so such a file is known to be abandoned.
+
+    Args:
+        comm: Communicator of the compilation; only its rank 0 compiles, so only that rank takes the lock.
+        directory: The cache.
+    """
+    if comm.rank != 0:
+        yield
+        return
+    directory.mkdir(parents=True, exist_ok=True)
+    with open(directory / "lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # released when the file is closed, also when the process dies
+        for source in directory.glob("*.c"):
+            if not source.with_suffix(".c.cached").exists():
+                source.unlink(missing_ok=True)
+        yield
