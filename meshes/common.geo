@@ -1,0 +1,57 @@
+// Macros for the geometries of this folder; no geometry by itself.
+
+// Layers of an extrusion that start with the size `size`, grow by the ratio `growth` up to the size `largest` and are
+// then shrunk together to fill `length`. Result: the lists of Layers{layers[], ends[]}.
+Macro Graded
+  layers[] = {};
+  ends[] = {};
+  reach = 0;
+  step = size;
+  For i In {1:10000} // gmsh has no "while"
+    If (reach < length * (1 - 1e-9))
+      reach += step;
+      step = growth * step < largest ? growth * step : largest;
+      layers[] += {1};
+      ends[] += {reach};
+    EndIf
+  EndFor
+  For i In {0:#ends[] - 1}
+    ends[i] /= reach;
+  EndFor
+Return
+
+// Extrude the whole plane section from z = 0 to z = depth in nz layers (dim = 3 only).
+Macro Thicken
+  If (dim == 3)
+    sections[] = Surface{:};
+    Extrude {0, 0, depth} { Surface{sections[]}; Layers{nz}; Recombine; }
+  Else
+    depth = 0;
+  EndIf
+Return
+
+// Physical group `name` of all cells with x and y in box[] = {x_min, x_max, y_min, y_max}.
+Macro Cells
+  If (dim == 3)
+    Physical Volume(Str(name)) = Volume In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, depth + e};
+  Else
+    Physical Surface(Str(name)) = Surface In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, e};
+  EndIf
+Return
+
+// Physical group `name` of all facets with x and y in box[]. One side of the box must be thin.
+Macro Facets
+  If (dim == 3)
+    Physical Surface(Str(name)) = Surface In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, depth + e};
+  Else
+    Physical Curve(Str(name)) = Curve In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, e};
+  EndIf
+Return
+
+// Physical groups `name` of the faces z = 0 and "back" of the faces z = depth (dim = 3 only).
+Macro Ends
+  If (dim == 3)
+    Physical Surface(Str(name)) = sections[];
+    Physical Surface("back") = Surface In BoundingBox{-1e9, -1e9, depth - e, 1e9, 1e9, depth + e};
+  EndIf
+Return
