@@ -1,0 +1,50 @@
+# make help lists the targets. Each makes the set-up it needs (scripts/setup.sh) and only once.
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-mpi bench lint docs clean
+
+NAME ?= blade
+STAMP := .venv/.setup-stamp
+DOCS_STAMP := .venv/.docs-stamp
+PYTHON_IN_VENV := .venv/bin/python
+RUN := scripts/run $(if $(RANKS),-n $(RANKS))
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+$(STAMP): pyproject.toml scripts/setup.sh
+	@bash scripts/setup.sh
+
+setup: $(STAMP) ## install what is missing
+
+demo: $(STAMP) ## run demos/demo_NAME.py: NAME=blade RANKS=2 QUICK=1 ARGS="--friction .1"; writes results/NAME
+	@test -f demos/demo_$(NAME).py || { echo "no demo '$(NAME)'; there are:" \
+	    $$(ls demos | sed -n 's/^demo_\(.*\)\.py$$/\1/p') >&2; exit 2; }
+	$(RUN) demos/demo_$(NAME).py $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
+
+test: $(STAMP) ## run all tests on one rank, then those marked mpi on 2 and 3 ranks
+	scripts/run -n 1 -m pytest tests $(ARGS)
+	@$(MAKE) --no-print-directory test-mpi
+
+test-mpi: $(STAMP) ## run the tests marked mpi on 2 and 3 ranks
+	for ranks in 2 3; do \
+	    scripts/run -n $$ranks -m pytest -x -q -p no:cacheprovider -m mpi tests $(ARGS) || exit 1; \
+	done
+
+bench: $(STAMP) ## print wall time, iterations and peak memory of the reference problems
+	scripts/run -n $(or $(RANKS),1) bench/bench.py $(ARGS)
+
+lint: $(STAMP) ## ruff and mypy
+	$(PYTHON_IN_VENV) -m ruff check .
+	$(PYTHON_IN_VENV) -m mypy
+
+$(DOCS_STAMP): $(STAMP)
+	$(PYTHON_IN_VENV) -m pip install --quiet --disable-pip-version-check -c .venv/constraints.txt -e '.[docs]'
+	@touch $@
+
+docs: $(DOCS_STAMP) ## build docs/_build/html
+	$(PYTHON_IN_VENV) -m sphinx -W --keep-going -b html docs docs/_build/html
+
+clean: ## remove results, caches and built docs; keeps .venv
+	rm -rf results docs/_build docs/jupyter_execute .mypy_cache .ruff_cache .pytest_cache
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
