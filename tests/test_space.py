@@ -1,0 +1,329 @@
+"""The cracked space against dof counts, spectra and solutions known in closed form or from one rank."""
+
+import basix.ufl
+import numpy as np
+import pytest
+import ufl
+from dolfinx import cpp, fem, mesh
+from dolfinx.fem.petsc import LinearProblem, assemble_matrix
+from dolfinx.io import VTXWriter
+from mpi4py import MPI
+
+from cutsim.space import crack_measure_entities, cracked_space
+
+pytestmark = pytest.mark.mpi
+
+WORLD = MPI.COMM_WORLD
+TRIANGLE, QUADRILATERAL = mesh.CellType.triangle, mesh.CellType.quadrilateral
+TETRAHEDRON, HEXAHEDRON = mesh.CellType.tetrahedron, mesh.CellType.hexahedron
+CELLS = [TRIANGLE, QUADRILATERAL, TETRAHEDRON, HEXAHEDRON]
+INTERVALS = 4
+
+
+def scatter_cells(comm, parts, dual, ghosting):
+    """Deal the cells to the ranks at random: the hardest case for who owns which copy of a dof."""
+    sizes = comm.allgather(dual.num_nodes)
+    owner = np.random.default_rng(3).integers(parts, size=sum(sizes))
+    here = owner[sum(sizes[: comm.rank]) :]
+    rows = [[here[i], *sorted(set(owner[dual.links(i)]) - {here[i]})] for i in range(dual.num_nodes)]
+    data = np.array([rank for row in rows for rank in row], dtype=np.int32)
+    return cpp.graph.AdjacencyList_int32(data, np.cumsum([0, *map(len, rows)]).astype(np.int32))
+
+
+PARTITIONERS = {
+    "compact": mesh.create_cell_partitioner(mesh.GhostMode.shared_facet),
+    "scattered": mesh.create_cell_partitioner(scatter_cells, mesh.GhostMode.shared_facet),
+}
+
+
+def box(cell, partition="compact", comm=WORLD, n=INTERVALS):
+    partitioner = PARTITIONERS[partition]
+    if cell in (TRIANGLE, QUADRILATERAL):
+        return mesh.create_unit_square(comm, n, n, cell, partitioner=partitioner)
+    return mesh.create_unit_cube(comm, n, n, n, cell, partitioner=partitioner)
+
+
+def upright(start, end):
+    """Part of the plane x = 1/2, from y = start to y = end."""
+    return lambda x: np.isclose(x[0], 0.5) & (x[1] > start - 1e-9) & (x[1] < end + 1e-9)
+
+
+def level(start, end):
+    """Part of the plane y = 1/2, from x = start to x = end."""
+    return lambda x: np.isclose(x[1], 0.5) & (x[0] > start - 1e-9) & (x[0] < end + 1e-9)
+
+
+# Each crack: its parts; the number of Lagrange points of the cracked unit square with m intervals between them
+# on a side, k = m/2 (in 3-D times m + 1); the number of bodies that are left.
+CRACKS = {
+    "split": ([upright(0, 1)], lambda m, k: 2 * (k + 1) * (m + 1), 2),
+    "edge": ([upright(0, 0.5)], lambda m, k: (m + 1) ** 2 + k, 1),
+    "inside": ([upright(0.25, 0.75)], lambda m, k: (m + 1) ** 2 + k - 1, 1),
+    "corner": ([upright(0.5, 1), level(0.5, 1)], lambda m, k: (m + 1) ** 2 - k**2 + (k + 1) ** 2, 2),
+    "tee": ([upright(0, 1), level(0.5, 1)], lambda m, k: (k + 1) * (m + 1) + 2 * (k + 1) ** 2, 3),
+    "cross": ([upright(0, 1), level(0, 1)], lambda m, k: 4 * (k + 1) ** 2, 4),
+}
+
+
+def facets_of(domain, markers):
+    return [mesh.locate_entities(domain, domain.topology.dim - 1, marker) for marker in markers]
+
+
+def gathered(V, form):
+    """The matrix of a form as a dense array, rows in the global order of the dofs, on every rank."""
+    A = assemble_matrix(fem.form(form))
+    A.assemble()
+    indptr, columns, values = A.getValuesCSR()
+    rows = np.zeros((len(indptr) - 1, A.getSize()[1]))
+    rows[np.repeat(np.arange(len(indptr) - 1), np.diff(indptr)), columns] = values
+    A.destroy()
+    return np.vstack(V.mesh.comm.allgather(rows))
+
+
+def sides(domain):
+    """The cells left and right of x = 1/2."""
+    markers = (lambda x: x[0] < 0.5 + 1e-9, lambda x: x[0] > 0.5 - 1e-9)
+    return [mesh.locate_entities(domain, domain.topology.dim, marker) for marker in markers]
+
+
+def integral(form):
+    return WORLD.allreduce(fem.assemble_scalar(fem.form(form)))
+
+
+def plus_measure(domain, facets, plus):
+    entities = crack_measure_entities(domain, facets, plus)
+    return ufl.Measure("dS", domain=domain, subdomain_data=[(3, entities)])(3)
+
+
+@pytest.mark.parametrize("partition", PARTITIONERS)
+@pytest.mark.parametrize("crack", CRACKS)
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("cell", CELLS)
+def test_number_of_dofs(cell, degree, crack, partition):
+    domain = box(cell, partition)
+    gdim, m = domain.geometry.dim, INTERVALS * degree
+    markers, points, _ = CRACKS[crack]
+    facets = facets_of(domain, markers)
+    expected = points(m, m // 2) * (m + 1) ** (gdim - 2)
+    for shape in ((), (gdim,)):
+        V = cracked_space(domain, ("Lagrange", degree, shape), facets)
+        assert V.dofmap.index_map.size_global == expected
+        assert V.dofmap.index_map_bs == V.dofmap.bs == (gdim if shape else 1)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("cell", [TETRAHEDRON, HEXAHEDRON])
+def test_front_of_a_crack_wholly_inside_a_body_is_shared(cell, degree):
+    domain, m = box(cell), INTERVALS * degree
+    facets = facets_of(domain, [lambda x: upright(0.25, 0.75)(x) & (np.abs(x[2] - 0.5) < 0.25 + 1e-9)])
+    V = cracked_space(domain, ("Lagrange", degree), facets)
+    assert V.dofmap.index_map.size_global == (m + 1) ** 3 + (m // 2 - 1) ** 2
+
+
+@pytest.mark.parametrize("partition", PARTITIONERS)
+@pytest.mark.parametrize("crack", CRACKS)
+@pytest.mark.parametrize("cell", CELLS)
+def test_spectrum_is_that_of_one_rank_with_one_zero_for_each_body(cell, crack, partition):
+    """-Δ: nullspace of one constant for each body; the whole spectrum does not know of the partition."""
+
+    def eigenvalues(domain):
+        V = cracked_space(domain, ("Lagrange", 1), facets_of(domain, CRACKS[crack][0]))
+        K = gathered(V, ufl.inner(ufl.grad(ufl.TrialFunction(V)), ufl.grad(ufl.TestFunction(V))) * ufl.dx)
+        assert np.all(np.diag(K) > 0)
+        return np.linalg.eigvalsh(K)
+
+    found = eigenvalues(box(cell, partition))
+    assert np.sum(np.abs(found) < 1e-10) == CRACKS[crack][2]
+    np.testing.assert_allclose(found, eigenvalues(box(cell, comm=MPI.COMM_SELF)), atol=1e-10)
+
+
+@pytest.mark.parametrize("crack", ["inside", "tee"])
+def test_elastic_bodies_have_three_rigid_motions_each(crack):
+    domain = box(TRIANGLE)
+    V = cracked_space(domain, ("Lagrange", 2, (2,)), facets_of(domain, CRACKS[crack][0]))
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    K = gathered(V, ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * ufl.dx)
+    assert np.sum(np.abs(np.linalg.eigvalsh(K)) < 1e-10) == 3 * CRACKS[crack][2]
+
+
+@pytest.mark.parametrize("partition", PARTITIONERS)
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("cell", CELLS)
+def test_step_function_jumps_by_one_over_the_area(cell, degree, partition):
+    domain = box(cell, partition)
+    facets = facets_of(domain, [upright(0, 1)])
+    left, right = sides(domain)
+    u = fem.Function(cracked_space(domain, ("Lagrange", degree), facets))
+    u.interpolate(lambda x: 1 + x[0] * x[1] ** (degree - 1), cells0=right)
+    u.interpolate(lambda x: x[0] * x[1] ** (degree - 1), cells0=left)
+    u.x.scatter_forward()
+    for plus, sign in ((right, 1), (left, -1)):
+        dS = plus_measure(domain, facets, plus)
+        assert integral((u("+") - u("-")) * dS) == pytest.approx(sign, abs=1e-13)
+        assert integral((u("+") - u("-")) ** 2 * dS) == pytest.approx(1, abs=1e-13)
+    assert integral(ufl.inner(ufl.grad(u), ufl.grad(u)) * ufl.dx) == pytest.approx(
+        1 if degree == 1 else 2 / 3, abs=1e-12
+    )
+
+
+@pytest.mark.parametrize("partition", PARTITIONERS)
+@pytest.mark.parametrize("cell", CELLS)
+def test_normal_of_the_plus_side_has_one_sign(cell, partition):
+    """Also on cells so skewed that their midpoints do not tell the side; the crack is x = ½ + 3(y − ½)."""
+    domain = box(cell, partition)
+    domain.geometry.x[:, 0] += 3 * (domain.geometry.x[:, 1] - 0.5)
+    facets = facets_of(domain, [lambda x: np.isclose(x[0] - 3 * (x[1] - 0.5), 0.5)])
+    below = mesh.locate_entities(domain, domain.topology.dim, lambda x: x[0] - 3 * x[1] < -1 + 1e-9)
+    n, zeros = ufl.FacetNormal(domain)("+"), [0.0] * (domain.geometry.dim - 2)
+    cases = [([1.0, 0.0], 1), ([-1.0, 0.0], -1), ([0.0, 1.0], -1), ([0.0, -2.0], 1), (below, 1)]
+    for plus, sign in cases:
+        side = plus if plus is below else plus + zeros
+        dS = plus_measure(domain, facets, side)
+        assert integral(n[0] * dS) == pytest.approx(sign)
+        assert integral(n[1] * dS) == pytest.approx(-3 * sign)
+        assert integral(abs(n[0]) * dS) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("partition", PARTITIONERS)
+def test_facets_and_cells_known_to_one_rank_are_enough(partition):
+    domain = box(TRIANGLE, partition)
+    (facets,) = facets_of(domain, [upright(0, 1)])
+    facet_map, cell_map = domain.topology.index_map(1), domain.topology.index_map(2)
+    elsewhere = facet_map.index_to_dest_ranks()
+    is_shared = np.array(
+        [f < facet_map.size_local and elsewhere.links(f).size > 0 for f in facets], dtype=bool
+    )
+    left, _ = sides(domain)
+    whole = cracked_space(domain, ("Lagrange", 1), facets)
+    entities = crack_measure_entities(domain, facets, left)
+    assert WORLD.allreduce(entities.size) == 4 * INTERVALS
+    for part in (facets[facets < facet_map.size_local], facets[~is_shared]):
+        V = cracked_space(domain, ("Lagrange", 1), [part, part[:1]])
+        np.testing.assert_array_equal(V.dofmap.list, whole.dofmap.list)
+        np.testing.assert_array_equal(V.dofmap.index_map.ghosts, whole.dofmap.index_map.ghosts)
+        owned = left[left < cell_map.size_local]
+        np.testing.assert_array_equal(crack_measure_entities(domain, part, owned), entities)
+
+
+@pytest.mark.parametrize("partition", PARTITIONERS)
+def test_boundary_dofs_are_found_on_both_sides_and_in_the_right_place(partition):
+    domain = box(TRIANGLE, partition)
+    V = cracked_space(domain, ("Lagrange", 2, (2,)), facets_of(domain, [upright(0, 1)]))
+    bottom = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[1], 0))
+    dofs = fem.locate_dofs_topological(V, 1, bottom)
+    owned = dofs[dofs < V.dofmap.index_map.size_local]
+    assert WORLD.allreduce(owned.size) == 2 * INTERVALS + 2
+    x = np.vstack(WORLD.allgather(V.tabulate_dof_coordinates()[owned]))
+    expected = np.sort([*np.linspace(0, 1, 2 * INTERVALS + 1), 0.5])
+    np.testing.assert_allclose(np.sort(x[:, 0]), expected, atol=1e-14)
+    np.testing.assert_allclose(x[:, 1], 0, atol=1e-14)
+
+
+@pytest.mark.parametrize("partition", PARTITIONERS)
+@pytest.mark.parametrize("cell", CELLS)
+def test_insulated_bodies_solve_their_own_poisson_problems(cell, partition):
+    """-u'' = 1 left and right of an insulating crack at x = ½, u(0) = 0, u(1) = 3: exact in degree 2."""
+    domain = box(cell, partition)
+    fdim = domain.topology.dim - 1
+    V = cracked_space(domain, ("Lagrange", 2), facets_of(domain, [upright(0, 1)]))
+    bcs = []
+    for place, value in ((0.0, 0.0), (1.0, 3.0)):
+        end = mesh.locate_entities_boundary(domain, fdim, lambda x, place=place: np.isclose(x[0], place))
+        bcs.append(fem.dirichletbc(value, fem.locate_dofs_topological(V, fdim, end), V))
+    u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+    solver = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+    uh = LinearProblem(
+        ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx, v * ufl.dx, bcs=bcs, petsc_options=solver
+    ).solve()
+    exact = fem.Function(V)
+    for cells, shift in zip(sides(domain), (0, 3), strict=True):
+        exact.interpolate(lambda x, shift=shift: x[0] * (1 - x[0]) / 2 + shift, cells0=cells)
+    exact.x.scatter_forward()
+    assert integral((uh - exact) ** 2 * ufl.dx) < 1e-20
+
+
+def test_inner_crack_lowers_the_flux_and_opens_symmetrically():
+    """u from -1 at x = 0 to 1 at x = 1: the flux is 2 without a crack, less with one, none when split."""
+    domain = box(QUADRILATERAL, n=8)
+    x = ufl.SpatialCoordinate(domain)
+    flux = []
+    for facets in (facets_of(domain, [upright(0.25, 0.75)]), facets_of(domain, [upright(0, 1)])):
+        V = cracked_space(domain, ("Lagrange", 1), facets)
+        ends = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(x[0], 0) | np.isclose(x[0], 1))
+        given = fem.Function(V)
+        given.interpolate(lambda x: 2 * x[0] - 1)
+        bc = fem.dirichletbc(given, fem.locate_dofs_topological(V, 1, ends))
+        u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
+        zero = fem.Constant(domain, 0.0)
+        solver = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+        uh = LinearProblem(
+            ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx, zero * v * ufl.dx, bcs=[bc], petsc_options=solver
+        ).solve()
+        flux.append(integral(ufl.inner(ufl.grad(uh), ufl.grad(uh)) * ufl.dx) / 2)
+        assert integral(uh * ufl.dx) == pytest.approx(0, abs=1e-12)
+        assert integral(uh * (x[1] - 0.5) * (x[0] - 0.5) * ufl.dx) == pytest.approx(0, abs=1e-12)
+        dS = plus_measure(domain, facets, [-1.0, 0.0])
+        assert integral((uh("+") - uh("-")) * dS) > 0.1
+        assert integral((uh("+") + uh("-")) * dS) == pytest.approx(0, abs=1e-12)
+    assert 0.2 < flux[0] < 1.9
+    assert flux[1] == pytest.approx(0, abs=1e-12)
+
+
+@pytest.mark.parametrize("cell", [TRIANGLE, HEXAHEDRON])
+def test_vtx_writes_it(cell, tmp_path):
+    path = WORLD.bcast(tmp_path) / "u.bp"
+    domain = box(cell)
+    V = cracked_space(domain, ("Lagrange", 2, (domain.geometry.dim,)), facets_of(domain, [upright(0, 1)]))
+    with VTXWriter(WORLD, path, [fem.Function(V)]) as writer:
+        writer.write(0.0)
+    assert sum(file.stat().st_size for file in path.iterdir()) > V.dofmap.index_map.size_global * 8
+
+
+@pytest.mark.parametrize(
+    ("element", "text"),
+    [
+        (("Lagrange", 3), "degree 1 or 2"),
+        (("DG", 1), "continuous Lagrange"),
+        (("N1curl", 1), "continuous Lagrange"),
+        (basix.ufl.mixed_element([basix.ufl.element("P", "triangle", 1)] * 2), "continuous Lagrange"),
+    ],
+)
+def test_other_elements_are_refused(element, text):
+    domain = box(TRIANGLE)
+    with pytest.raises(ValueError, match=f"element: .*{text}"):
+        cracked_space(domain, element, facets_of(domain, [upright(0, 1)]))
+
+
+def test_facets_are_checked_on_all_ranks():
+    domain = box(TRIANGLE)
+    element, none = ("Lagrange", 1), np.empty(0, dtype=np.int32)
+    with pytest.raises(ValueError, match=r"facets: 4 lie on the outer boundary, e\.g\. at \[0\.0, 0\.\d"):
+        cracked_space(domain, element, facets_of(domain, [upright(0, 1), lambda x: np.isclose(x[0], 0)]))
+    for empty in (none, [none, none], []):
+        with pytest.raises(ValueError, match="facets: 0 on all ranks"):
+            cracked_space(domain, element, empty)
+    beyond = np.array([10**6], dtype=np.int32) if WORLD.rank == 0 else none
+    with pytest.raises(ValueError, match="facets: 1 indices out of range.*1000000"):
+        cracked_space(domain, element, beyond)
+
+
+@pytest.mark.skipif(WORLD.size == 1, reason="one rank needs no ghost cells")
+def test_missing_ghost_cells_are_refused():
+    domain = mesh.create_unit_square(WORLD, 4, 4, ghost_mode=mesh.GhostMode.none)
+    with pytest.raises(ValueError, match=r"mesh: \d+ facets between ranks lack .*GhostMode\.shared_facet"):
+        cracked_space(domain, ("Lagrange", 1), facets_of(domain, [upright(0, 1)]))
+
+
+def test_plus_side_is_checked_on_all_ranks():
+    domain = box(QUADRILATERAL)
+    facets = facets_of(domain, [upright(0, 1)])
+    cells = mesh.locate_entities(domain, 2, lambda x: x[0] > -1)
+    upper_left = mesh.locate_entities(domain, 2, lambda x: (x[0] < 0.5 + 1e-9) & (x[1] > 0.5 - 1e-9))
+    for plus, count in ((cells, 4), (upper_left, 2)):
+        with pytest.raises(ValueError, match=rf"plus: {count} facets have both .* at \[0\.5, 0\.\d"):
+            crack_measure_entities(domain, facets, plus)
+    with pytest.raises(ValueError, match=r"plus: \[0\.0, 1\.0\] is tangent to 4 facets"):
+        crack_measure_entities(domain, facets, [0.0, 1.0])
+    for plus in ([0.0, 0.0], [1.0, 0.0, 0.0], [np.nan, 1.0]):
+        with pytest.raises(ValueError, match=r"plus: .* is no direction; allowed are 2 finite floats"):
+            crack_measure_entities(domain, facets, plus)
