@@ -1,0 +1,340 @@
+"""Geometries and tagged meshes: measures against closed form, sizes, and the refusal of bad input."""
+
+from pathlib import Path
+
+import dolfinx
+import gmsh
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import CellType, GhostMode
+from mpi4py import MPI
+
+from cutsim.meshing import (
+    TaggedMesh,
+    cell_size,
+    facet_size,
+    global_range,
+    normal_size,
+    read_geo,
+    read_msh,
+    tag_mesh,
+)
+
+MESHES = Path(__file__).parents[1] / "meshes"
+COMM = MPI.COMM_WORLD
+pytestmark = pytest.mark.mpi
+
+BLOCK = {"Lx": 10, "H": 3, "B": 4, "lc": 0.4, "nz": 3}
+DCB = {"L": 40, "h": 1.5, "b": 5, "a0": 12, "back": 2, "fine": 8, "lc": 0.5, "lc_arm": 1, "ny": 2, "nz": 2}
+SENB = {"W": 10, "S": 40, "L": 50, "B": 4, "a": 4.5, "lc": 0.5, "nz": 2}
+
+
+def block_measures(dim, notch, width=1.0):
+    cells = {"left": 30, "right": 30}
+    inner = {"crack": 3 - notch} | ({"notch": notch} if notch else {})
+    outer = {"top_left": 10, "top_right": 10, "bottom": 20, "far_left": 3, "far_right": 3}
+    return scaled(dim, width, cells, inner, outer)
+
+
+def dcb_measures(dim, width=1.0):
+    cells = {"lower": 60, "upper": 60}
+    inner = {"crack": 28, "precrack": 12}
+    outer = {"load_upper": 1.5, "load_lower": 1.5, "end": 3, "top": 40, "bottom": 40}
+    return scaled(dim, width, cells, inner, outer)
+
+
+def senb_measures(dim, width=1.0):
+    cells = {"left": 250, "right": 250}
+    outer = {"support_left": 1, "support_right": 1, "load": 1}
+    return scaled(dim, width, cells, {"crack": 5.5, "notch": 4.5}, outer)
+
+
+def scaled(dim, width, cells, inner, outer):
+    """Measures of the plane figure, times the width; the end faces have the area of the plane figure."""
+    groups = [{name: width * value for name, value in group.items()} for group in (cells, inner, outer)]
+    if dim == 3:
+        groups[2] |= dict.fromkeys(("front", "back"), sum(cells.values()))
+    return groups
+
+
+def with_symmetry(groups):
+    cells, inner, outer = groups
+    return [cells, inner, {("symmetry" if name == "front" else name): value for name, value in outer.items()}]
+
+
+# Geometry, parameters, measures of the groups, measure of the whole boundary.
+CASES = {
+    "block": ("block", BLOCK | {"dim": 2}, block_measures(2, 0.5), 46),
+    "block without notch": ("block", BLOCK | {"dim": 2, "notch": 0}, block_measures(2, 0), 46),
+    "block 3-D": ("block", BLOCK | {"dim": 3}, block_measures(3, 0.5, 4), 4 * 46 + 2 * 60),
+    "half block": (
+        "block",
+        BLOCK | {"dim": 3, "sym": 1},
+        with_symmetry(block_measures(3, 0.5, 2)),
+        2 * 46 + 2 * 60,
+    ),
+    "dcb": ("dcb", DCB | {"dim": 2}, dcb_measures(2), 86),
+    "dcb 3-D": ("dcb", DCB | {"dim": 3}, dcb_measures(3, 5), 5 * 86 + 2 * 120),
+    "half dcb": ("dcb", DCB | {"dim": 3, "sym": 1}, with_symmetry(dcb_measures(3, 2.5)), 2.5 * 86 + 2 * 120),
+    "senb": ("senb", SENB | {"dim": 2}, senb_measures(2), 120),
+    "senb 3-D": ("senb", SENB | {"dim": 3}, senb_measures(3, 4), 4 * 120 + 2 * 500),
+    "half senb": ("senb", SENB | {"dim": 3, "sym": 1}, with_symmetry(senb_measures(3, 2)), 2 * 120 + 2 * 500),
+}
+
+
+def geometry(name, parameters):
+    return read_geo(MESHES / f"{name}.geo", COMM, parameters, gdim=parameters["dim"])
+
+
+def measure(mesh, kind, entities):
+    """Integral of one over the given cells ("dx"), exterior ("ds") or interior ("dS") facets."""
+    dim = mesh.topology.dim if kind == "dx" else mesh.topology.dim - 1
+    tags = dolfinx.mesh.meshtags(mesh, dim, np.sort(entities), 1)
+    one = fem.Constant(mesh, 1.0)
+    integral = ufl.Measure(kind, domain=mesh, subdomain_data=tags)(1)
+    return COMM.allreduce(fem.assemble_scalar(fem.form((one("+") if kind == "dS" else one) * integral)))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_groups_have_their_closed_form_measures(case):
+    name, parameters, (cells, inner, outer), boundary = CASES[case]
+    tagged = geometry(name, parameters)
+    mesh = tagged.mesh
+    assert set(tagged.names) == cells.keys() | inner.keys() | outer.keys()
+    for group, value in cells.items():
+        assert measure(mesh, "dx", tagged.cells(group)) == pytest.approx(value, rel=1e-12)
+    for group, value in inner.items():
+        assert measure(mesh, "dS", tagged.facets(group)) == pytest.approx(value, rel=1e-12)
+        assert measure(mesh, "ds", tagged.facets(group)) == 0
+    for group, value in outer.items():
+        assert measure(mesh, "ds", tagged.facets(group)) == pytest.approx(value, rel=1e-12)
+        assert measure(mesh, "dS", tagged.facets(group)) == 0
+    exterior = dolfinx.mesh.exterior_facet_indices(mesh.topology)
+    assert measure(mesh, "ds", exterior) == pytest.approx(boundary, rel=1e-12)
+    assert mesh.topology.cell_type == (
+        CellType.quadrilateral if mesh.topology.dim == 2 else CellType.hexahedron
+    )
+
+
+@pytest.mark.parametrize("name", ["block", "dcb", "senb"])
+def test_every_owned_crack_facet_knows_both_cells(name):
+    tagged = geometry(name, {"dim": 2})
+    topology = tagged.mesh.topology
+    topology.create_connectivity(1, 2)
+    facets = tagged.facets("crack")
+    owned = facets[facets < topology.index_map(1).size_local]
+    assert all(len(topology.connectivity(1, 2).links(facet)) == 2 for facet in owned)
+
+
+def test_block_is_uniform_along_the_crack_and_across_the_band():
+    tagged = geometry("block", {"dim": 2, "H": 4, "notch": 0.5, "lc": 0.25, "band": 1, "growth": 1.25})
+    crack = tagged.facets("crack")
+    assert global_range(COMM, facet_size(tagged.mesh, crack)) == pytest.approx((0.25, 0.25))
+    assert global_range(COMM, normal_size(tagged.mesh, crack)) == pytest.approx((0.25, 0.25))
+    tops = np.concatenate(COMM.allgather(top_edges(tagged)))
+    edges = np.unique(tops.round(9))
+    sizes = np.diff(edges[edges >= 0])
+    assert edges[0] == -30 and edges[-1] == 30
+    assert sizes[:4] == pytest.approx(0.25)
+    assert sizes[5:] / sizes[4:-1] == pytest.approx(1.25)
+    assert 0.25 <= 1.25 * sizes[4] and sizes[4] <= 1.25 * 0.25
+
+
+def top_edges(tagged):
+    x = tagged.mesh.geometry.x
+    return x[np.abs(x[:, 1]) < 1e-9, 0]
+
+
+def test_dcb_sizes():
+    tagged = geometry("dcb", {"dim": 2})
+    assert global_range(COMM, facet_size(tagged.mesh, tagged.facets("precrack"))) == pytest.approx(
+        (0.25, 0.25)
+    )
+    assert global_range(COMM, normal_size(tagged.mesh, tagged.facets("crack"))) == pytest.approx((0.25, 0.25))
+    x = dolfinx.mesh.compute_midpoints(tagged.mesh, 1, tagged.facets("crack"))[:, 0]
+    sizes = facet_size(tagged.mesh, tagged.facets("crack"))
+    assert global_range(COMM, sizes[x < 65]) == pytest.approx((0.25, 0.25))
+    assert global_range(COMM, sizes[x > 65])[1] > 2
+
+
+def test_senb_has_vertices_at_the_tip_the_supports_and_the_load():
+    tagged = geometry("senb", SENB | {"dim": 2})
+    mesh = tagged.mesh
+    owned = mesh.topology.index_map(0).size_local
+    for point in ((0, 4.5), (-20, 0), (20, 0), (0, 10)):
+        found = dolfinx.mesh.locate_entities(
+            mesh, 0, lambda x, p=point: np.isclose(x[0], p[0]) & np.isclose(x[1], p[1])
+        )
+        assert COMM.allreduce(int((found < owned).sum())) == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "parameters", "gdim", "message"),
+    [
+        ("block.geo", {"length": 3}, 3, "unknown parameter 'length'.*known: B, H, Lx"),
+        ("block.geo", {"lc": float("nan")}, 3, "'lc' = nan must be finite"),
+        ("block.geo", {"notch": 5}, 3, "notch = 5 must lie in"),
+        ("block.geo", {"dim": 4}, 3, "dim = 4, must be 2 or 3"),
+        ("block.geo", {"dim": 2}, 3, "gdim = 3, but the highest dimension of a physical group is 2"),
+        ("dcb.geo", {"fine": 90}, 2, "fine = 90 in"),
+        ("senb.geo", {"a": 25}, 2, "must lie in"),
+        ("nothing.geo", None, 2, "nothing.geo: no such file"),
+    ],
+)
+def test_bad_geometry_input_is_refused_on_all_ranks(file, parameters, gdim, message):
+    with pytest.raises(ValueError, match=message):
+        read_geo(MESHES / file, COMM, parameters, gdim)
+
+
+def test_unknown_group_names_are_refused():
+    tagged = geometry("block", BLOCK | {"dim": 2})
+    with pytest.raises(ValueError, match="'crack' is no group of cells; known: left, right"):
+        tagged.cells("crack")
+    with pytest.raises(ValueError, match="'cleft' is no group of facets; known: crack, "):
+        tagged.facets("cleft")
+
+
+def test_an_open_gmsh_session_survives():
+    if COMM.rank == 0:
+        gmsh.initialize(interruptible=False)
+    with pytest.raises(ValueError, match="session is already open"):
+        geometry("block", BLOCK | {"dim": 2})
+    if COMM.rank == 0:
+        assert gmsh.isInitialized()
+        gmsh.finalize()
+
+
+SQUARES = """
+Point(1) = {0, 0, 0}; Point(2) = {0, 1, 0}; Line(1) = {1, 2}; Transfinite Curve{1} = 4;
+right[] = Extrude {2, 0, 0} { Curve{1}; Layers{4}; Recombine; };
+left[] = Extrude {-1, 0, 0} { Curve{1}; Layers{2}; Recombine; };
+Physical Curve("middle") = {1};
+"""
+
+
+def write(folder, name, text):
+    """Path of the same file on all ranks, written by rank 0."""
+    path = COMM.bcast(folder / name)
+    if COMM.rank == 0:
+        path.write_text(text + "\n")
+    COMM.Barrier()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("groups", "message"),
+    [
+        (
+            'Physical Surface("a") = {left[1], right[1]}; Physical Surface("b") = {left[1]};',
+            "'b' .* overlaps",
+        ),
+        ('Physical Surface("a") = left[1]; Physical Surface("middle") = right[1];', "two .* called 'middle'"),
+        (
+            'Line(99) = {3, 1}; Physical Surface("a") = left[1]; Physical Surface("b") = right[1]; Foo;',
+            "line",
+        ),
+        ("", "highest dimension of a physical group is 1"),
+        (
+            'Physical Surface("a") = left[1];'
+            "Point(20) = {5, 0, 0}; Point(21) = {6, 0, 0}; Point(22) = {5, 1, 0}; Line(31) = {20, 21};"
+            "Line(32) = {21, 22}; Line(33) = {22, 20}; Curve Loop(40) = {31, 32, 33};"
+            "Plane Surface(50) = {40};"
+            'Physical Surface("b") = 50;',
+            "must be of one type, found .*Triangle",
+        ),
+    ],
+)
+def test_groups_that_make_no_mesh_are_refused(tmp_path, groups, message):
+    with pytest.raises(ValueError, match=message):
+        read_geo(write(tmp_path, "squares.geo", SQUARES + groups), COMM, gdim=2)
+
+
+def test_read_msh_gives_the_same_mesh_as_its_geometry(tmp_path):
+    groups = 'Physical Surface("a") = left[1]; Physical Surface("b") = right[1];'
+    geo = write(tmp_path, "squares.geo", SQUARES + groups)
+    msh = geo.with_suffix(".msh")
+    if COMM.rank == 0:
+        gmsh.initialize(interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(geo))
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(msh))
+        gmsh.finalize()
+    for tagged in (read_msh(msh, COMM, gdim=2), read_geo(geo, COMM, gdim=2)):
+        assert tagged.mesh.topology.index_map(2).size_global == 18
+        assert measure(tagged.mesh, "dx", tagged.cells("a")) == pytest.approx(1)
+        assert measure(tagged.mesh, "dx", tagged.cells("b")) == pytest.approx(2)
+        assert measure(tagged.mesh, "dS", tagged.facets("middle")) == pytest.approx(1)
+
+
+def halves(mesh) -> TaggedMesh:
+    return tag_mesh(
+        mesh,
+        {"left": lambda x: x[0] < 0.5 + 1e-9, "right": lambda x: x[0] > 0.5 - 1e-9},
+        {"crack": lambda x: np.isclose(x[0], 0.5), "far": lambda x: np.isclose(x[0], 1)},
+    )
+
+
+@pytest.mark.parametrize("cell", [CellType.tetrahedron, CellType.hexahedron])
+def test_markers_tag_cells_and_facets(cell):
+    tagged = halves(dolfinx.mesh.create_unit_cube(COMM, 4, 4, 4, cell, ghost_mode=GhostMode.shared_facet))
+    for name in ("left", "right"):
+        assert measure(tagged.mesh, "dx", tagged.cells(name)) == pytest.approx(0.5)
+    assert measure(tagged.mesh, "dS", tagged.facets("crack")) == pytest.approx(1)
+    assert measure(tagged.mesh, "ds", tagged.facets("far")) == pytest.approx(1)
+
+
+def test_bad_markers_are_refused():
+    mesh = dolfinx.mesh.create_unit_square(COMM, 4, 4)
+    everything = {"all": lambda x: x[0] < 2}
+    corner = {"corner": lambda x: (x[0] < 0.3) & (x[1] < 0.3)}  # on one rank only, if there are more
+    with pytest.raises(ValueError, match="'gap' finds no entity of dimension 1"):
+        tag_mesh(mesh, everything, {"gap": lambda x: x[0] > 2})
+    with pytest.raises(ValueError, match="'corner' finds entities of another group"):
+        tag_mesh(mesh, everything | corner, {})
+    with pytest.raises(ValueError, match=r"both have \['all'\]"):
+        tag_mesh(mesh, everything, everything)
+
+
+@pytest.mark.parametrize("cell", [CellType.triangle, CellType.quadrilateral])
+def test_sizes_in_the_plane(cell):
+    mesh = dolfinx.mesh.create_rectangle(
+        COMM, [(0, 0), (1, 2)], [4, 4], cell, ghost_mode=GhostMode.shared_facet
+    )
+    tagged = halves(mesh)
+    assert global_range(COMM, facet_size(mesh, tagged.facets("crack"))) == pytest.approx((0.5, 0.5))
+    assert global_range(COMM, normal_size(mesh, tagged.facets("crack"))) == pytest.approx((0.25, 0.25))
+    longest = 0.5 if cell == CellType.quadrilateral else np.hypot(0.5, 0.25)
+    assert global_range(COMM, cell_size(mesh, tagged.cells("left"))) == pytest.approx((longest, longest))
+
+
+@pytest.mark.parametrize("cell", [CellType.tetrahedron, CellType.hexahedron])
+def test_sizes_in_space(cell):
+    corners = [(0, 0, 0), (1, 2, 4)]
+    mesh = dolfinx.mesh.create_box(COMM, corners, [4, 4, 4], cell, ghost_mode=GhostMode.shared_facet)
+    tagged = halves(mesh)
+    plane = 1 if cell == CellType.hexahedron else np.hypot(0.5, 1)
+    space = 1 if cell == CellType.hexahedron else np.linalg.norm((0.25, 0.5, 1))
+    assert global_range(COMM, facet_size(mesh, tagged.facets("crack"))) == pytest.approx((plane, plane))
+    assert global_range(COMM, normal_size(mesh, tagged.facets("crack"))) == pytest.approx((0.25, 0.25))
+    assert global_range(COMM, cell_size(mesh, tagged.cells("left"))) == pytest.approx((space, space))
+
+
+def test_normal_size_is_that_of_the_thinner_cell_and_of_sheared_cells_the_height():
+    ghosts = GhostMode.shared_facet
+    mesh = dolfinx.mesh.create_unit_square(COMM, 2, 4, CellType.quadrilateral, ghost_mode=ghosts)
+    tagged = halves(mesh)
+    x = mesh.geometry.x
+    x[np.isclose(x[:, 0], 0.5), 0] = 0.2
+    x[:, 1] += 3 * x[:, 0]
+    assert global_range(COMM, normal_size(mesh, tagged.facets("crack"))) == pytest.approx((0.2, 0.2))
+    assert global_range(COMM, normal_size(mesh, tagged.facets("far"))) == pytest.approx((0.8, 0.8))
+
+
+def test_global_range_spans_the_ranks_and_needs_a_value():
+    mine = np.array([1.0 + COMM.rank]) if COMM.rank == COMM.size - 1 else np.empty(0)
+    assert global_range(COMM, mine) == (COMM.size, COMM.size)
+    with pytest.raises(ValueError, match="values is empty on every rank"):
+        global_range(COMM, np.empty(0))
