@@ -143,6 +143,8 @@ def normal_size(mesh: Mesh, facets: NDArray[np.int32]) -> NDArray[np.float64]:
     """
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
+    if len(facets) == 0:  # entities_to_geometry of dolfinx 0.9 divides by zero
+        return np.empty(0)
     neighbours = [mesh.topology.connectivity(tdim - 1, tdim).links(facet) for facet in facets]
     rows = np.repeat(np.arange(len(facets)), [len(cells) for cells in neighbours])
     x = mesh.geometry.x
@@ -151,7 +153,7 @@ def normal_size(mesh: Mesh, facets: NDArray[np.int32]) -> NDArray[np.float64]:
     across = corners[:, 2] - corners[:, 0] if tdim == 3 else np.array([0.0, 0.0, 1.0])
     normals = np.cross(along, across)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    cells = np.concatenate([*neighbours, np.empty(0, np.int32)])
+    cells = np.concatenate(neighbours)
     from_facet = x[mesh.geometry.dofmap[cells]] - corners[rows, :1]
     heights = np.abs(np.einsum("nvi,ni->nv", from_facet, normals[rows])).max(axis=1)
     sizes = np.full(len(facets), np.inf)

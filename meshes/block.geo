@@ -1,4 +1,4 @@
-// Block to be cut: two halves that meet in the plane x = 0. Lengths in mm. Quadrilaterals (dim = 2) or hexahedra (dim = 3).
+// Block to be cut: two halves that meet in the plane x = 0. Lengths in mm, quadrilaterals or hexahedra.
 //
 //              top_left  | top_right        y = 0       y  thickness, the blade moves along -y
 //            +-----------:-----------+                  |

@@ -1,4 +1,4 @@
-// Double cantilever beam: two arms bonded along y = 0. Lengths in mm. Quadrilaterals (dim = 2) or hexahedra (dim = 3).
+// Double cantilever beam: two arms bonded along y = 0. Lengths in mm, quadrilaterals or hexahedra.
 //
 //                                     top                           y = h    y  opening
 //               +--------------------------------------------+               |
@@ -8,9 +8,11 @@
 //               +--------------------------------------------+             z  width (dim = 3)
 //             x = 0               x = a0  bottom           x = L    y = -h
 //
-// Sizes along x: lc_arm from x = 0, lc from a0 - back to a0 + fine, growing from there to x = L. First-order elements bend
-// with a relative error of about (size / h)^2 / 3 in stiffness when fully integrated: keep lc and lc_arm below h / 5.
-// dim = 3: z from 0 to b, faces "front" (z = 0) and "back" (z = b); sym = 1: half the width, "symmetry" and "back" (z = b/2).
+// Sizes along x: lc_arm from x = 0, lc from a0 - back to a0 + fine, growing from there to x = L.
+// Fully integrated first-order elements of the size s bend too stiffly, by about (s / h)^2 / 3 + 1 / (4 ny^2)
+// (measured on a cantilever): keep lc and lc_arm below h / 5, or use second order.
+// dim = 3: z from 0 to b, faces "front" (z = 0) and "back" (z = b). With sym = 1 only the half 0 < z < b/2 of a beam
+// centred on z = 0, faces "symmetry" (z = 0) and "back" (z = b/2).
 Include "common.geo";
 DefineConstant[
   dim    = {2,    Name "dim"},     // 2 or 3

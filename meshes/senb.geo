@@ -1,4 +1,4 @@
-// Three-point bend of a notched beam (SENB). Lengths in mm. Quadrilaterals (dim = 2) or hexahedra (dim = 3).
+// Three-point bend of a notched beam (SENB). Lengths in mm, quadrilaterals or hexahedra.
 //
 //                              load                                y = W    y
 //      +-----------------------====-----------------------+                 |
@@ -12,7 +12,8 @@
 // The crack plane is x = 0: "notch" for 0 < y < a, "crack" for a < y < W. Supports and load are patches of the width
 // `patch`, centred on (-S/2, 0), (S/2, 0) and (0, W), which are mesh vertices (lines along z if dim = 3).
 // Sizes: lc within `band` of the crack plane and of the tip and for `ahead` above the tip, growing from there to lc_far.
-// dim = 3: z from 0 to B, faces "front" (z = 0) and "back" (z = B); sym = 1: half the thickness, "symmetry" and "back" (z = B/2).
+// dim = 3: z from 0 to B, faces "front" (z = 0) and "back" (z = B). With sym = 1 only the half 0 < z < B/2 of a beam
+// centred on z = 0, faces "symmetry" (z = 0) and "back" (z = B/2).
 Include "common.geo";
 DefineConstant[
   dim    = {2,    Name "dim"},     // 2 or 3
