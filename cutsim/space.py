@@ -32,8 +32,9 @@ def cracked_space(mesh: Mesh, element: Any, facets: Facets) -> fem.FunctionSpace
     through facets that contain it and are not cracked. This alone separates bodies, keeps the dofs of a front
     that ends inside a body shared, and makes three copies where cracks meet in a T, four where they cross.
 
-    Sub-spaces can be constrained as usual, but ``V.sub(i).collapse()`` rebuilds a dofmap from the mesh and so
-    closes the crack: make a scalar cracked space instead.
+    Everything of dolfinx that goes through cells sees both sides. What goes through a facet of the crack does
+    not: ``locate_dofs_topological`` on crack facets finds the dofs of one side, and not always of the same.
+    On the outer boundary it finds all, also where the crack meets it.
 
     Args:
         mesh: The mesh; on several ranks with ghost mode ``shared_facet``.
@@ -178,12 +179,10 @@ def _refuse_facets(mesh: Mesh, bad: NDArray[np.int32], text: str) -> None:
 
 
 def _cells_of(mesh: Mesh, facets: NDArray[Any]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The two cells of each facet and its local number in them, each of shape (facets, 2)."""
-    row = np.full(_facet_map(mesh).size_local + _facet_map(mesh).num_ghosts, -1, dtype=np.int32)
-    row[facets] = np.arange(facets.size)
+    """The two cells of each of the ascending facets, and its number in them, both of shape (facets, 2)."""
     cell_facets = _cell_facets(mesh)
-    cells, local = np.nonzero(row[cell_facets] >= 0)
-    order = np.argsort(row[cell_facets[cells, local]], kind="stable")
+    cells, local = np.nonzero(np.isin(cell_facets, facets))
+    order = np.argsort(cell_facets[cells, local], kind="stable")
     pairs = np.stack([cells[order], local[order]], dtype=np.int32).reshape(2, -1, 2)
     return pairs[0], pairs[1]
 
@@ -205,16 +204,14 @@ def _along(
     """Whether the normal out of the first cell of each facet points along the direction."""
     tdim, gdim, facets = mesh.topology.dim, mesh.geometry.dim, facets.astype(np.int32)
     sound = direction.shape == (gdim,) and np.all(np.isfinite(direction)) and np.any(direction)
-    message = f"plus: {direction.tolist()} is no direction; allowed are {gdim} finite floats, not all zero"
+    message = f"plus: {direction} is no direction; allowed are {gdim} finite floats, not all zero"
     _refuse(mesh.comm, None if sound else message)
     normals = cpp.mesh.cell_normals(mesh._cpp_object, tdim - 1, facets).reshape(-1, 3)
     first = np.ascontiguousarray(cells[:, 0], dtype=np.int32)
     outward = compute_midpoints(mesh, tdim - 1, facets) - compute_midpoints(mesh, tdim, first)
     normals *= np.sign(np.sum(normals * outward.reshape(-1, 3), axis=1, keepdims=True))
     cosine = normals[:, :gdim] @ (direction / np.linalg.norm(direction))
-    text = (
-        f"plus: {direction.tolist()} is tangent to {{}} facets, e.g. at {{}}; allowed is |n·e| > {_TANGENT}"
-    )
+    text = f"plus: {direction} is tangent to {{}} facets, e.g. at {{}}; allowed is |n·e| > {_TANGENT}"
     _refuse_facets(mesh, facets[np.abs(cosine) <= _TANGENT], text)
     return cosine > 0
 
@@ -240,7 +237,7 @@ class _Copies:
 
     keys: NDArray[np.int64]  # all (dof, cell) keys, sorted ...
     labels: NDArray[np.int64]  # ... and the copy that each belongs to
-    owners: NDArray[np.int32]  # rank that owns each copy
+    owners: NDArray[np.int32]  # rank that owns each copy, ascending
 
 
 def _check_element(element: Any) -> None:
@@ -286,11 +283,12 @@ def _copies(comm: MPI.Comm, incidence: _Incidence) -> _Copies:
     order = np.argsort(np.concatenate(owned_keys))
     keys, ranks = np.concatenate(owned_keys)[order], ranks[order]
     first, second = np.searchsorted(keys, np.concatenate(comm.allgather(incidence.links))).T
-    adjacency = coo_array((np.ones(first.size, dtype=np.int8), (first, second)), shape=(keys.size, keys.size))
+    adjacency = coo_array((np.ones(first.size), (first, second)), shape=(keys.size, keys.size))
     count, labels = connected_components(adjacency, directed=False)
     owners = np.full(count, comm.size, dtype=np.int32)
     np.minimum.at(owners, labels, ranks)
-    return _Copies(keys, labels, owners)
+    by_owner = np.argsort(owners, kind="stable")
+    return _Copies(keys, np.argsort(by_owner)[labels], owners[by_owner])
 
 
 def _split_dofs(
@@ -299,23 +297,18 @@ def _split_dofs(
     """Global number and owner of the dofs of every local cell, each of shape (cells, dofs of a cell)."""
     comm, index_map, cell_dofs = parent.mesh.comm, parent.dofmap.index_map, parent.dofmap.list
     kept = np.flatnonzero(~incidence.marked[: index_map.size_local])
-    kept_on = np.array(comm.allgather(kept.size))
-    copies_on = np.bincount(copies.owners, minlength=comm.size)
-    start = np.concatenate([[0], np.cumsum(kept_on + copies_on)])
-
+    kept_before = np.cumsum([0, *comm.allgather(kept.size)])
+    copies_before = np.searchsorted(copies.owners, comm.rank)
     number = la.vector(index_map, dtype=np.int64)
-    number.array[kept] = start[comm.rank] + np.arange(kept.size)
+    number.array[kept] = kept_before[comm.rank] + copies_before + np.arange(kept.size)
     number.scatter_forward()
     owner = np.concatenate([np.full(index_map.size_local, comm.rank), index_map.owners])
     dofs, owners = number.array[cell_dofs], owner[cell_dofs]
 
-    by_owner = np.argsort(copies.owners, kind="stable")
-    within = np.empty_like(by_owner)
-    within[by_owner] = np.arange(by_owner.size) - (np.cumsum(copies_on) - copies_on)[copies.owners[by_owner]]
-    copy_number = start[copies.owners] + kept_on[copies.owners] + within
     copy = copies.labels[np.searchsorted(copies.keys, incidence.keys)]
-    dofs[incidence.cells, incidence.places] = copy_number[copy]
-    owners[incidence.cells, incidence.places] = copies.owners[copy]
+    on_crack = incidence.cells, incidence.places
+    owners[on_crack] = copies.owners[copy]
+    dofs[on_crack] = kept_before[copies.owners[copy] + 1] + copy  # after the kept dofs of its owner
     return dofs, owners.astype(np.int32)
 
 
