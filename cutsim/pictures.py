@@ -368,7 +368,7 @@ def _add_body(
     limits: tuple[float, float],
     flat: bool,
 ) -> None:
-    linear = body.celltypes.max() < 15  # VTK's first-order cells; others are drawn in parts
+    linear = bool(body.celltypes.max() < 15)  # VTK's first-order cells; others are drawn in parts
     actor = plotter.add_mesh(
         _surface(body), scalars=scalars, cmap="viridis", clim=limits, show_edges=linear, edge_color="#20242a",
         edge_opacity=0.25, line_width=1, lighting=not flat, ambient=0.35, diffuse=0.75, specular=0.1,
