@@ -59,12 +59,12 @@ class Progress:
         """
         if not self._active:
             return
-        text = "  ".join(f"{name} {_short(value)}" for name, value in info.items())
+        text = "  ".join(f"{name} {_short(value)}" for name, value in {"t": t, **info}.items())
         if self._bar is not None:
             self._bar.update(self._task, completed=t - self._start, info=text)
             return
         share = (t - self._start) / (self._end - self._start)
-        self._line = f"{self._title}: {share:4.0%}  t {_short(t)}  {text}"
+        self._line = f"{self._title}: {share:4.0%}  {text}"
         if time.monotonic() - self._last >= self._interval:
             self._print()
 
