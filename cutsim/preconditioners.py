@@ -6,74 +6,162 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from dolfinx import fem, la
+from numpy.typing import NDArray
 from petsc4py import PETSc
+
+#: Unknowns up to which a factorisation is the fastest, by dimension of space.
+DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 15_000}
 
 
 @dataclass(frozen=True)
 class Preset:
-    """A linear solver: options of the Krylov method and of the preconditioner kept by `LaggedPC`.
+    """A linear solver: a Krylov method, a preconditioner that is kept, and perhaps a strip along the crack.
 
     Attributes:
-        name: Short name, for logs.
+        name: "direct", "bulk" or "crack".
         ksp: PETSc options of the Krylov method, without prefix.
-        pc: PETSc options of the preconditioner, without prefix.
-        patience: Krylov iterations of one solve beyond which the preconditioner is rebuilt.
+        kept: PETSc options of the preconditioner kept by `LaggedPC`, without prefix.
+        patience: Krylov iterations of one solve beyond which the kept preconditioner counts as stale.
+        strip: PETSc options of the solver on the strip along the crack (`StripCycle`), empty without strip.
     """
 
     name: str
     ksp: Mapping[str, Any]
-    pc: Mapping[str, Any] = field(default_factory=dict)
-    patience: int = 8
+    kept: Mapping[str, Any]
+    patience: int
+    strip: Mapping[str, Any] = field(default_factory=dict)
 
 
 def preset_for(n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gdim: int) -> Preset:
     """Choose the linear solver by size, symmetry, ranks and presence of a crack.
 
+    The Krylov method is always GMRES with the preconditioner on the right: it bears a tangent made indefinite by
+    softening or by a wild iterate, measures the true residual, and costs the same as CG at the few iterations
+    needed here.
+
     Args:
         n_dofs: Global number of unknowns.
         symmetric: Whether the tangent is symmetric.
         ranks: Number of MPI ranks.
-        has_interface: Whether there is a crack whose stiffness may be very large or negative.
+        has_interface: Whether there is a crack, whose stiffness may be very large or negative.
         gdim: Dimension of space; in the plane a factorisation stays cheap much longer.
 
     Returns:
         The preset.
     """
-    return _direct(symmetric)
+    factor = {"pc_type": "cholesky" if symmetric else "lu", "pc_factor_mat_solver_type": "mumps"}
+    if n_dofs <= DIRECT_LIMIT[gdim]:
+        return Preset("direct", _gmres(1e-6, 20), factor, patience=8)
+    # On several ranks SOR is a block method, which needs Chebyshev to bound it.
+    smoother = "richardson" if ranks == 1 else "chebyshev"
+    amg = {
+        "pc_type": "gamg",
+        "mg_levels_ksp_type": smoother,
+        "mg_levels_ksp_max_it": 1,
+        "mg_levels_pc_type": "sor",
+    }
+    if has_interface:
+        return Preset("crack", _gmres(1e-4, 200), amg, patience=40, strip=factor)
+    return Preset("bulk", _gmres(1e-4, 200), amg, patience=30)
 
 
-def _direct(symmetric: bool) -> Preset:
-    """Factorisation, kept as preconditioner over iterations and steps; GMRES because softening is indefinite."""
-    ksp = {"ksp_type": "gmres", "ksp_pc_side": "right", "ksp_rtol": 1e-6, "ksp_max_it": 40}
-    pc = {"pc_type": "cholesky" if symmetric else "lu", "pc_factor_mat_solver_type": "mumps"}
-    return Preset("direct", ksp, pc)
+def _gmres(rtol: float, max_it: int) -> dict[str, Any]:
+    return {"ksp_type": "gmres", "ksp_pc_side": "right", "ksp_rtol": rtol, "ksp_max_it": max_it}
+
+
+def rigid_body_modes(V: fem.FunctionSpace) -> PETSc.NullSpace:
+    """Translations and infinitesimal rotations of a displacement space, orthonormal. Collective.
+
+    Args:
+        V: Lagrange space of vectors with as many components as the space has dimensions, cracked or not.
+
+    Returns:
+        3 modes in the plane, 6 in space, as near-nullspace for algebraic multigrid.
+
+    Raises:
+        ValueError: If V is not a space of 2-D or 3-D displacements.
+    """
+    gdim, bs = V.mesh.geometry.dim, V.dofmap.index_map_bs
+    if bs != gdim or gdim not in (2, 3):
+        raise ValueError(f"V has {bs} components in {gdim} dimensions: must be 2 in 2 or 3 in 3")
+    n = V.dofmap.index_map.size_local
+    x = V.tabulate_dof_coordinates()[:n, :gdim]
+    modes = [np.tile(e, (n, 1)) for e in np.eye(gdim)]
+    for i, j in [(0, 1), (1, 2), (2, 0)][: 1 if gdim == 2 else 3]:
+        rotation = np.zeros((n, gdim))
+        rotation[:, i], rotation[:, j] = -x[:, j], x[:, i]
+        modes.append(rotation)
+    vectors = [la.create_petsc_vector(V.dofmap.index_map, bs) for _ in modes]
+    for vector, mode in zip(vectors, modes, strict=True):
+        vector.array[:] = mode.ravel()
+    _orthonormalise(vectors)
+    return PETSc.NullSpace().create(vectors=vectors, comm=V.mesh.comm)
+
+
+def _orthonormalise(vectors: list[PETSc.Vec]) -> None:
+    for i, v in enumerate(vectors):
+        for w in vectors[:i]:
+            v.axpy(-v.dot(w), w)
+        v.normalize()
+
+
+def strip_dofs(V: fem.FunctionSpace, interface_dofs: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Unknowns of the crack faces and of one layer of cells beside each. Collective.
+
+    Args:
+        V: The displacement space.
+        interface_dofs: Owned (blocked) dofs on both faces of the cracks.
+
+    Returns:
+        Owned unrolled dofs, ascending.
+    """
+    index_map, bs = V.dofmap.index_map, V.dofmap.index_map_bs
+    mark = la.vector(index_map, 1)
+    mark.array[interface_dofs] = 1.0
+    mark.scatter_forward()
+    cells = V.dofmap.list
+    layer = cells[np.any(mark.array[cells] > 0.0, axis=1)]
+    mark.array[layer.ravel()] = 1.0
+    mark.scatter_reverse(la.InsertMode.add)
+    nodes = np.flatnonzero(mark.array[: index_map.size_local] > 0.0)
+    return (nodes[:, None] * bs + np.arange(bs)).ravel().astype(np.int32)
 
 
 class LaggedPC:
     """PETSc python preconditioner that keeps an inner one until it has gone stale.
 
-    It is (re)built when there is none, when the last linear solve failed or took more than `patience`
-    iterations, and on `refresh`. All ranks see the same iteration counts, so the decision is collective.
+    The inner one is built when there is none, when the last linear solve failed, when it took more iterations
+    than `patience` and than 1.5 times those right after the build, and on `refresh`. All ranks see the same
+    iteration counts, so the decision is collective.
 
     Args:
         prefix: Options prefix of the inner preconditioner.
-        patience: Krylov iterations of one solve beyond which it counts as stale.
+        patience: Krylov iterations of one solve that never count as stale.
+
+    Attributes:
+        builds: How often the inner preconditioner was built.
+        fresh: Whether it was built for the present tangent.
     """
 
     def __init__(self, prefix: str, patience: int) -> None:
-        self.prefix = prefix
-        self.patience = patience
         self.builds = 0
-        self.fresh = False  # built for the tangent of the current linear solve
+        self.fresh = False
+        self._prefix, self._patience = prefix, patience
+        self._limit = float(patience)
         self._stale = True
         self._inner: PETSc.PC | None = None
 
     def refresh(self, *, pattern: bool = False) -> None:
-        """Rebuild at the next linear solve; with `pattern`, also forget the symbolic factorisation."""
+        """Rebuild at the next linear solve.
+
+        Args:
+            pattern: The sparsity pattern has changed too: forget the symbolic factorisation.
+        """
         self._stale = True
-        if pattern and self._inner is not None:
-            self._inner.destroy()
-            self._inner = None
+        if pattern:
+            self._free()
 
     def observe(self, iterations: int, converged: bool) -> None:
         """Take note of a finished linear solve.
@@ -82,16 +170,15 @@ class LaggedPC:
             iterations: Krylov iterations it took.
             converged: Whether it met its tolerance.
         """
-        self._stale |= not converged or iterations > self.patience
+        if self.fresh:
+            self._limit = max(self._patience, 1.5 * iterations)
+        self._stale |= not converged or iterations > self._limit
 
-    def setUp(self, pc: PETSc.PC) -> None:  # noqa: N802 (name fixed by PETSc)
+    def setUp(self, pc: PETSc.PC) -> None:
         """Called by PETSc when the tangent has changed."""
-        A, P = pc.getOperators()
         if self._inner is None:
-            self._inner = PETSc.PC().create(pc.comm)
-            self._inner.setOptionsPrefix(self.prefix)
-            self._inner.setOperators(A, P)
-            self._inner.setFromOptions()
+            self._inner = _create_pc(self._prefix, *pc.getOperators())
+            self._stale = True
         self.fresh = self._stale
         if self._stale:
             self._inner.setReusePreconditioner(False)
@@ -102,11 +189,88 @@ class LaggedPC:
         pc.setFailedReason(self._inner.getFailedReason())
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Apply the kept preconditioner."""
+        """Called by PETSc: y = (kept preconditioner) x."""
         self._inner.apply(x, y)
 
     def destroy(self, pc: PETSc.PC) -> None:
-        """Free the kept preconditioner."""
+        """Called by PETSc at the end."""
+        self._free()
+
+    def _free(self) -> None:
         if self._inner is not None:
             self._inner.destroy()
             self._inner = None
+
+
+class StripCycle(LaggedPC):
+    """Multiplicative cycle strip, kept preconditioner, strip; for cracks of any stiffness.
+
+    Multigrid built in the elastic state is kept while the crack stiffens, softens and opens: what changes is
+    confined to the strip along the crack, and that is factorised anew for every tangent.
+
+    Args:
+        prefix: Options prefix of the kept preconditioner.
+        patience: As for `LaggedPC`.
+        strip_prefix: Options prefix of the solver on the strip.
+        dofs: Owned unrolled dofs of the strip, see `strip_dofs`.
+        symmetric: Whether the tangent is symmetric.
+    """
+
+    def __init__(
+        self, prefix: str, patience: int, strip_prefix: str, dofs: NDArray[np.int32], symmetric: bool
+    ) -> None:
+        super().__init__(prefix, patience)
+        self._strip_prefix, self._dofs, self._symmetric = strip_prefix, dofs, symmetric
+        self._strip: PETSc.PC | None = None
+
+    def setUp(self, pc: PETSc.PC) -> None:
+        """Called by PETSc when the tangent has changed."""
+        super().setUp(pc)
+        A = pc.getOperators()[1]
+        if self._strip is None:
+            self._is = PETSc.IS().createGeneral(self._dofs + A.getOwnershipRange()[0], comm=A.comm)
+            self._B = A.createSubMatrix(self._is, self._is)
+            self._B.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
+            self._strip = _create_pc(self._strip_prefix, self._B, self._B)
+            self._b, self._c = self._B.createVecs()
+            self._r, self._z = A.createVecs()
+        else:
+            A.createSubMatrix(self._is, self._is, self._B)
+            self._strip.setOperators(self._B, self._B)
+        self._strip.setUp()
+        if self._strip.getFailedReason():
+            pc.setFailedReason(self._strip.getFailedReason())
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Called by PETSc: one cycle from y = 0."""
+        A = pc.getOperators()[0]
+        y.set(0.0)
+        self._correct_strip(x, y)
+        A.mult(y, self._r)
+        self._r.aypx(-1.0, x)
+        self._inner.apply(self._r, self._z)
+        y.axpy(1.0, self._z)
+        A.mult(y, self._r)
+        self._r.aypx(-1.0, x)
+        self._correct_strip(self._r, y)
+
+    def _correct_strip(self, r: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add to y the solution on the strip for the residual r."""
+        self._b.array[:] = r.array_r[self._dofs]
+        self._strip.apply(self._b, self._c)
+        y.array[self._dofs] += self._c.array_r
+
+    def _free(self) -> None:
+        super()._free()
+        if self._strip is not None:
+            for thing in (self._strip, self._is, self._B, self._b, self._c, self._r, self._z):
+                thing.destroy()
+            self._strip = None
+
+
+def _create_pc(prefix: str, A: PETSc.Mat, P: PETSc.Mat) -> PETSc.PC:
+    pc = PETSc.PC().create(A.comm)
+    pc.setOptionsPrefix(prefix)
+    pc.setOperators(A, P)
+    pc.setFromOptions()
+    return pc

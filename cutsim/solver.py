@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import ufl
+import dolfinx.fem.petsc  # makes fem.petsc available
 from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from cutsim import compat
-from cutsim.preconditioners import LaggedPC, Preset, preset_for
+from cutsim.preconditioners import LaggedPC, StripCycle, preset_for, rigid_body_modes, strip_dofs
 
 LINE_SEARCHES = ("l2", "bt", "basic")
 #: Rounding floor of the residual, as a fraction of the nodal forces diag(K) u that cancel in it.
@@ -127,15 +128,15 @@ class NonlinearProblem:
         self._diagonal.set(0.0)
         self._A = fem.petsc.create_matrix(self._a)
         self._A.setOption(PETSc.Mat.Option.SYMMETRIC, symmetric)
+        if V.dofmap.index_map_bs == V.mesh.geometry.dim > 1:
+            self._A.setNearNullSpace(rigid_body_modes(V))
         self._previous_scale = 0.0
         self._residuals: list[float] = []
         self._lagged: LaggedPC | None = None
         self._options = _Options(petsc_options_prefix, petsc_options or {})
         self._snes = self._create_snes()
         if not (self._options.has("pc_type") or self._options.has("ksp_type")):
-            gdim = V.mesh.geometry.dim
-            size = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
-            self._use(preset_for(size, symmetric, self._comm.size, interface_dofs is not None, gdim))
+            self._install_preset(symmetric, interface_dofs)
         self._snes.setFromOptions()
 
     def _create_snes(self) -> PETSc.SNES:
@@ -150,11 +151,20 @@ class NonlinearProblem:
         self._options.default("snes_linesearch_type", LINE_SEARCHES[0])
         return snes
 
-    def _use(self, preset: Preset) -> None:
-        """Install a preset; options of the user win."""
-        for key, value in {**preset.ksp, **{f"lagged_{k}": v for k, v in preset.pc.items()}}.items():
-            self._options.default(key, value)
-        self._lagged = LaggedPC(self._options.prefix + "lagged_", preset.patience)
+    def _install_preset(self, symmetric: bool, interface_dofs: npt.NDArray[np.int32] | None) -> None:
+        """Choose the linear solver; options of the user win over its own."""
+        V, options = self.u.function_space, self._options
+        size = V.dofmap.index_map.size_global * V.dofmap.index_map_bs
+        preset = preset_for(size, symmetric, self._comm.size, interface_dofs is not None, V.mesh.geometry.dim)
+        for part, values in (("", preset.ksp), ("kept_", preset.kept), ("strip_", preset.strip)):
+            for key, value in values.items():
+                options.default(part + key, value)
+        kept = options.prefix + "kept_"
+        if preset.strip:
+            strip = strip_dofs(V, interface_dofs)
+            self._lagged = StripCycle(kept, preset.patience, options.prefix + "strip_", strip, symmetric)
+        else:
+            self._lagged = LaggedPC(kept, preset.patience)
         pc = self._snes.getKSP().getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
         pc.setPythonContext(self._lagged)
