@@ -1,0 +1,46 @@
+"""Compiled forms to reduced numbers and owned arrays. Every function is collective."""
+
+import numpy as np
+from dolfinx import fem, la
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def integrate(form: fem.Form) -> float:
+    """Value of a scalar form, summed over ranks."""
+    return float(form.mesh.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
+
+
+def nodal_forces(form: fem.Form) -> Array:
+    """Vector of a linear form: the owned entries, contributions of other ranks added."""
+    b = fem.assemble_vector(form)
+    b.scatter_reverse(la.InsertMode.add)
+    return b.array[: b.index_map.size_local * b.block_size].copy()
+
+
+def global_dot(comm: MPI.Comm, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Scalar product of two distributed arrays of owned entries."""
+    return float(comm.allreduce(float(a @ b), op=MPI.SUM))
+
+
+def resultant(comm: MPI.Comm, forces: NDArray[np.float64], gdim: int) -> Array:
+    """Sum of nodal forces (owned entries, blocked by component): a force vector."""
+    return np.asarray(comm.allreduce(forces.reshape(-1, gdim).sum(axis=0), op=MPI.SUM))
+
+
+def moment(comm: MPI.Comm, forces: NDArray[np.float64], arms: NDArray[np.float64], gdim: int) -> Array:
+    """Moment Σ arm × force of nodal forces: three components in 3-D, the one about the normal in 2-D.
+
+    Args:
+        comm: Communicator of the distributed arrays.
+        forces: Owned nodal forces, blocked by component.
+        arms: Positions relative to the reference point, shape (owned nodes, 3) [length].
+        gdim: Geometric dimension.
+    """
+    padded = np.zeros((len(forces) // gdim, 3))
+    padded[:, :gdim] = forces.reshape(-1, gdim)
+    local = np.cross(arms, padded).sum(axis=0)
+    total = np.asarray(comm.allreduce(local, op=MPI.SUM))
+    return total if gdim == 3 else total[2:]

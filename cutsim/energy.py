@@ -1,0 +1,51 @@
+"""The energy audit: external work against what became of it (THEORY §6)."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from cutsim.terms import ENTRIES
+
+
+@dataclass(frozen=True)
+class EnergyAudit:
+    """Energies since the start of a run [energy].
+
+    External work is summed from reactions and loads (trapezoidal rule); stored energies are functions of the state;
+    dissipated ones are summed from the tractions of the residual.  They are computed independently of each other, so
+    that their difference says how well the steps resolve the process.
+
+    Attributes:
+        external: Work of supports, loads and tools.
+        entries: The other side: strain, cohesive_stored, fracture, friction, contact, viscous.
+        scale: Largest turnover so far, the reference of the relative closure.
+    """
+
+    external: float = 0.0
+    entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(ENTRIES, 0.0))
+    scale: float = 0.0
+
+    def advance(self, work: float, energies: Iterable[Mapping[str, float]]) -> "EnergyAudit":
+        """Audit after a step.
+
+        Args:
+            work: External work of the step.
+            energies: Contributions of the terms, totals since the start.
+        """
+        entries = dict.fromkeys(ENTRIES, 0.0)
+        for contribution in energies:
+            for name, value in contribution.items():
+                entries[name] += value
+        external = self.external + work
+        turnover = max(abs(external), sum(abs(v) for v in entries.values()))
+        return replace(self, external=external, entries=entries, scale=max(self.scale, turnover))
+
+    @property
+    def closure(self) -> float:
+        """(external work − sum of the entries) / largest turnover so far [–]."""
+        return (self.external - sum(self.entries.values())) / self.scale if self.scale > 0 else 0.0
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity)."""
+        columns = {"work_external": (self.external, "energy")}
+        columns |= {f"energy_{name}": (value, "energy") for name, value in self.entries.items()}
+        return columns | {"energy_closure": (self.closure, "one")}

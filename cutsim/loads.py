@@ -1,0 +1,148 @@
+"""Supports and dead loads."""
+
+from collections.abc import Callable
+
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem
+from numpy.typing import NDArray
+
+from cutsim.assembly import global_dot, nodal_forces, resultant
+from cutsim.checks import require
+from cutsim.compat import form
+from cutsim.kinematics import Expr
+from cutsim.state import State
+from cutsim.terms import Term
+
+History = Callable[[float], float]
+
+
+class Support:
+    """Prescribed displacement of one component on some facets (or vertices), with its reaction.
+
+    Args:
+        state: Displacement and time.
+        entities: Local mesh entities.
+        component: Index of the displacement component.
+        value: Displacement, a number or a function of time [length].
+        name: Name in the history, None to leave the reaction out of it.
+        dim: Dimension of the entities; facets by default.
+        corners: Times at which the velocity jumps.
+
+    Raises:
+        ValueError: The component does not exist, or no entity is found on any rank.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        entities: NDArray[np.int32],
+        component: int,
+        value: float | History = 0.0,
+        *,
+        name: str | None = None,
+        dim: int | None = None,
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require("component", component, component in range(gdim), f"0 … {gdim - 1}")
+        dim = state.mesh.topology.dim - 1 if dim is None else dim
+        state.mesh.topology.create_connectivity(dim, state.mesh.topology.dim)
+        self.name, self.state, self.component, self.corners = name, state, component, corners
+        V = state.V.sub(component)
+        dofs = fem.locate_dofs_topological(V, dim, np.unique(np.asarray(entities, dtype=np.int32)))
+        owned = len(state.increment)
+        self._dofs = dofs[dofs < owned]
+        found = state.mesh.comm.allreduce(len(self._dofs))
+        require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
+        self._history: History = value if callable(value) else lambda _: float(value)
+        self._value = fem.Constant(state.mesh, default_scalar_type(self._history(0.0)))
+        self.bc = fem.dirichletbc(self._value, dofs, V)
+
+    @property
+    def displacement(self) -> float:
+        """Prescribed displacement at the end of the step [length]."""
+        return float(self._value.value)
+
+    def begin(self, time: float) -> None:
+        """Set the displacement to its value at a time."""
+        self._value.value = self._history(time)
+
+    def reaction(self, residual: NDArray[np.float64]) -> float:
+        """Force of the support on the body along its component [force]. Collective.
+
+        Args:
+            residual: Owned entries of internal minus external nodal forces.
+        """
+        return float(self.state.mesh.comm.allreduce(float(residual[self._dofs].sum())))
+
+
+class Traction(Term):
+    """Dead traction on a part of the boundary.
+
+    Args:
+        state: Displacement and time.
+        facets: Local exterior facets.
+        direction: Traction at factor 1, one number a component [stress].
+        factor: Function of time that scales it.
+        name: Name in messages and output.
+        corners: Times at which the factor has a kink.
+
+    Raises:
+        ValueError: The direction has the wrong number of components.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        direction: tuple[float, ...],
+        factor: History,
+        *,
+        name: str = "load",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require("direction", direction, len(direction) == gdim, f"{gdim} numbers")
+        self.name, self.state, self._direction, self._factor, self._corners = name, state, direction, factor, corners
+        self._ds = state.measures.exterior(facets)
+        self._scale = fem.Constant(state.mesh, default_scalar_type(factor(0.0)))
+        self._scale_old = float(self._scale.value)
+        self._form = form(self.residual(ufl.TestFunction(state.V)))
+        self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
+        self._forces_old: NDArray[np.float64] = self._forces
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which the factor has a kink."""
+        return self._corners
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Virtual work −∫ t·v of the load."""
+        return -self._scale * ufl.dot(ufl.as_vector(self._direction), v) * self._ds
+
+    def begin(self, time: float) -> None:
+        """Set the load to its value at a time."""
+        self._scale.value = self._factor(time)
+
+    def rollback(self) -> None:
+        """Set the load back to the start of the step."""
+        self._scale.value = self._scale_old
+
+    def evaluate(self) -> None:
+        """Nodal forces of the load. Collective."""
+        self._forces = -nodal_forces(self._form)
+
+    def external_work(self) -> float:
+        """Work of the load in the step: mean force times displacement increment. Collective."""
+        mean = 0.5 * (self._forces + self._forces_old)
+        return global_dot(self.state.mesh.comm, mean, self.state.increment)
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Resultant of the load. Collective."""
+        total = resultant(self.state.mesh.comm, self._forces, self.state.mesh.geometry.dim)
+        return {f"{self.name}_force_{'xyz'[i]}": (float(f), "force") for i, f in enumerate(total)}
+
+    def commit(self) -> None:
+        """Adopt the load."""
+        self._scale_old, self._forces_old = float(self._scale.value), self._forces

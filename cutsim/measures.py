@@ -1,0 +1,54 @@
+"""Integration measures of one mesh, all drawing on the same lists of entities.
+
+dolfinx compiles a sum of terms only if they share their subdomain data.  A term asks for the entities it needs and
+gets a measure with a marker of its own; '+' is the first cell of an interior-facet row, on any number of ranks.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+import ufl
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+
+class Measures:
+    """Hands out measures over cells, exterior facets and interior facets.
+
+    Args:
+        mesh: The mesh; its facet–cell connectivity is created.
+    """
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        self._tdim = mesh.topology.dim
+        mesh.topology.create_connectivity(self._tdim - 1, self._tdim)
+        mesh.topology.create_connectivity(self._tdim, self._tdim - 1)
+        self._data: dict[str, list[tuple[int, NDArray[np.int32]]]] = {"dx": [], "ds": [], "dS": []}
+
+    def cells(self, cells: Iterable[int] | None = None) -> ufl.Measure:
+        """Measure over local cells (all if None); ghosts are left out."""
+        owned = self.mesh.topology.index_map(self._tdim).size_local
+        chosen = np.arange(owned) if cells is None else np.unique(np.asarray(cells))
+        return self._add("dx", chosen[chosen < owned])
+
+    def exterior(self, facets: Iterable[int]) -> ufl.Measure:
+        """Measure over local exterior facets; facets of ghost cells are left out."""
+        owned = self.mesh.topology.index_map(self._tdim).size_local
+        to_cells = self.mesh.topology.connectivity(self._tdim - 1, self._tdim)
+        to_facets = self.mesh.topology.connectivity(self._tdim, self._tdim - 1)
+        pairs = []
+        for facet in np.unique(np.asarray(facets, dtype=np.int32)):
+            cells = to_cells.links(facet)
+            if len(cells) == 1 and cells[0] < owned:
+                pairs.append((cells[0], int(np.flatnonzero(to_facets.links(cells[0]) == facet)[0])))
+        return self._add("ds", np.asarray(pairs))
+
+    def interior(self, entities: NDArray[np.int32]) -> ufl.Measure:
+        """Measure over interior facets given as rows (cell⁺, local facet⁺, cell⁻, local facet⁻)."""
+        return self._add("dS", entities)
+
+    def _add(self, kind: str, entities: NDArray[np.integer]) -> ufl.Measure:
+        marker = len(self._data[kind])
+        self._data[kind].append((marker, np.asarray(entities, dtype=np.int32).ravel()))
+        return ufl.Measure(kind, domain=self.mesh, subdomain_data=self._data[kind], subdomain_id=marker)

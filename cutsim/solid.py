@@ -1,0 +1,153 @@
+"""A deformable body: hyperelastic bulk with optional Kelvin–Voigt viscosity (THEORY §2)."""
+
+import logging
+from typing import Literal
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from cutsim.assembly import integrate
+from cutsim.checks import require
+from cutsim.compat import form
+from cutsim.kinematics import Expr, deformation_gradient, green_lagrange
+from cutsim.materials import Material
+from cutsim.state import State
+from cutsim.terms import Term
+
+logger = logging.getLogger(__name__)
+
+#: Poisson's ratio from which the volumetric part is integrated with fewer points by default.
+NEARLY_INCOMPRESSIBLE = 0.45
+
+
+class Solid(Term):
+    """Hyperelastic body that occupies some cells.
+
+    Args:
+        state: Displacement and time.
+        material: Strain energy.
+        cells: Local cells of the body (ghosts allowed); all by default.
+        name: Name in messages and output.
+        plane: For two-dimensional meshes, plane strain or plane stress (unit thickness).
+        volumetric: "full" or "reduced" integration of the volumetric part; by default reduced for ν ≥ 0.45.
+            On simplices of degree 1 both coincide, and a warning says that the element locks.
+        viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
+
+    Raises:
+        ValueError: A parameter is outside its range.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        material: Material,
+        cells: NDArray[np.int32] | None = None,
+        *,
+        name: str = "body",
+        plane: Literal["strain", "stress"] = "strain",
+        volumetric: Literal["auto", "full", "reduced"] = "auto",
+        viscosity: float = 0.0,
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
+        require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
+        require("volumetric", volumetric, volumetric in ("auto", "full", "reduced"), "'auto', 'full' or 'reduced'")
+        require("viscosity", viscosity, viscosity >= 0, ">= 0")
+        self.name = name
+        self.state = state
+        self.material = material
+        self.plane = plane
+        self.viscosity = viscosity
+        self.cells = cells
+        self._dx, self._dx_volumetric = self._measures(volumetric)
+        self._energy_form = form(self._stored(state.u))
+        self._viscous_form = form(self._viscous_work()) if viscosity else None
+        self._viscous = self._viscous_old = 0.0
+
+    def deformation_gradient(self, u: Expr) -> Expr:
+        """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""
+        F = deformation_gradient(u)
+        return deformation_gradient(u, self.material.plane_stress_stretch(F)) if self.plane == "stress" else F
+
+    def first_piola(self, u: Expr) -> Expr:
+        """First Piola–Kirchhoff stress P = ∂W/∂F, 3 × 3 [stress]."""
+        F = ufl.variable(self.deformation_gradient(u))
+        return ufl.diff(sum(self.material.energy(F)), F)
+
+    def cauchy_stress(self, u: Expr) -> Expr:
+        """Cauchy stress σ = P Fᵀ / J, 3 × 3 [stress]."""
+        F = self.deformation_gradient(u)
+        return self.first_piola(u) * F.T / ufl.det(F)
+
+    def strain_energy_density(self, u: Expr) -> Expr:
+        """Strain energy per reference volume W [energy/length³]."""
+        return sum(self.material.energy(self.deformation_gradient(u)))
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Virtual work of the elastic and viscous stresses."""
+        work = ufl.derivative(self._stored(self.state.u), self.state.u, v)
+        if self.viscosity:
+            E = green_lagrange(deformation_gradient(self.state.u))
+            rate = (E - green_lagrange(deformation_gradient(self.state.u_old))) / self.state.dt
+            work += self.viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self._dx
+        return work
+
+    def evaluate(self) -> None:
+        """Add the viscous dissipation of the step. Collective."""
+        if self._viscous_form is not None:
+            self._viscous = self._viscous_old + integrate(self._viscous_form)
+
+    def energies(self) -> dict[str, float]:
+        """Strain energy and viscous dissipation so far. Collective."""
+        return {"strain": integrate(self._energy_form), "viscous": self._viscous}
+
+    def diagnose(self) -> str | None:
+        """Name the body if an element is inverted. Collective."""
+        smallest = self.smallest_jacobian()
+        return f"{self.name}: element inverted, smallest J = {smallest:.3g}" if not smallest > 0 else None
+
+    def smallest_jacobian(self) -> float:
+        """Smallest det F at the integration points. Collective."""
+        cell = basix.CellType[self.state.mesh.topology.cell_name()]
+        points = basix.make_quadrature(cell, self._dx.metadata()["quadrature_degree"])[0]
+        owned = self.state.mesh.topology.index_map(self.state.mesh.topology.dim).size_local
+        cells = np.arange(owned, dtype=np.int32) if self.cells is None else self.cells[self.cells < owned]
+        J = fem.Expression(ufl.det(self.deformation_gradient(self.state.u)), points)
+        values = J.eval(self.state.mesh, cells)
+        local = float(np.nan_to_num(values, nan=-np.inf).min()) if values.size else np.inf
+        return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
+
+    def commit(self) -> None:
+        """Adopt the viscous dissipation."""
+        self._viscous_old = self._viscous
+
+    def _measures(self, volumetric: str) -> tuple[ufl.Measure, ufl.Measure]:
+        element = self.state.V.ufl_element()
+        cell, degree = element.cell_type.name, element.degree
+        simplex = cell in ("triangle", "tetrahedron")
+        # full integration: (degree + 1) points in each direction of a tensor-product cell, exact stiffness on simplices
+        full = 2 * (degree - 1) if simplex else 2 * degree
+        if volumetric == "auto":
+            volumetric = "reduced" if self.material.poisson >= NEARLY_INCOMPRESSIBLE else "full"
+        if self.material.poisson >= NEARLY_INCOMPRESSIBLE and simplex and degree == 1:
+            logger.warning(
+                "%s: a linear %s locks at Poisson's ratio %.3g; use quadrilaterals, hexahedra or degree 2",
+                self.name,
+                cell,
+                self.material.poisson,
+            )
+        reduced = full if volumetric == "full" else max(full - 2, 1)
+        dx = self.state.measures.cells(self.cells)
+        return dx(metadata={"quadrature_degree": full}), dx(metadata={"quadrature_degree": reduced})
+
+    def _stored(self, u: Expr) -> ufl.Form:
+        shear, volumetric = self.material.energy(self.deformation_gradient(u))
+        return shear * self._dx + volumetric * self._dx_volumetric
+
+    def _viscous_work(self) -> ufl.Form:
+        new, old = (green_lagrange(deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
+        return self.viscosity / self.state.dt * ufl.inner(new - old, new - old) * self._dx

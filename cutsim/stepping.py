@@ -1,0 +1,214 @@
+"""The loop over steps: the only place that commits.
+
+One step: begin → move tools and loads → solve → (failure: roll back, another line search, then a smaller step) → trial
+history → accept or reject → commit, record.
+"""
+
+import logging
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import FrameType
+
+from mpi4py import MPI
+
+from cutsim.checks import require
+from cutsim.mechanics import Mechanics
+from cutsim.solver import Outcome
+
+logger = logging.getLogger(__name__)
+
+# a step that would leave less than this fraction of itself before a corner is stretched to meet it
+_SLIVER = 0.1
+
+
+class StepError(RuntimeError):
+    """No equilibrium was found with the smallest step allowed; what was recorded before stays readable."""
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """How large steps are.
+
+    Args:
+        first: First step, and the first one after each corner of a path [time].
+        largest: Largest step [time].
+        smallest: Step below which the run gives up [time]; a thousandth of `first` by default.
+        growth: Factor after an easy step, > 1.
+        cut: Factor after a rejected step, in (0, 1).
+        easy: Newton iterations up to which a step counts as easy.
+        damage: Largest growth of damage at a point in a step, in (0, 1]; None for no limit.
+        closure: Largest change of the energy audit's relative closure in a step; None for no limit.
+        line_searches: Line searches tried in turn for the same step.
+
+    Raises:
+        ValueError: A value is outside its range.
+    """
+
+    first: float
+    largest: float
+    smallest: float = 0.0
+    growth: float = 1.4
+    cut: float = 0.5
+    easy: int = 6
+    damage: float | None = None
+    closure: float | None = None
+    line_searches: tuple[str, ...] = ("l2", "bt")
+
+    def __post_init__(self) -> None:
+        require("first", self.first, self.first > 0, "> 0")
+        require("largest", self.largest, self.largest >= self.first, f">= first = {self.first}")
+        if not self.smallest:
+            object.__setattr__(self, "smallest", 1e-3 * self.first)
+        require("smallest", self.smallest, 0 < self.smallest <= self.first, f"in (0, first = {self.first}]")
+        require("growth", self.growth, self.growth > 1, "> 1")
+        require("cut", self.cut, 0 < self.cut < 1, "in (0, 1)")
+        require("damage", self.damage, self.damage is None or 0 < self.damage <= 1, "in (0, 1] or None")
+        require("closure", self.closure, self.closure is None or self.closure > 0, "> 0 or None")
+        require("line_searches", self.line_searches, len(self.line_searches) > 0, "at least one")
+
+    @classmethod
+    def fixed(cls, step: float) -> "StepControl":
+        """Equal steps as long as they converge; a step that fails is cut, and later ones grow back."""
+        return cls(first=step, largest=step)
+
+
+@dataclass
+class StepReport:
+    """One accepted step, for recorders.
+
+    Attributes:
+        number: Steps accepted so far.
+        time: Time at its end [time].
+        dt: Its size [time].
+        outcome: What the solver did.
+        cuts: Rejected attempts since the previous accepted step.
+        columns: History columns, name → (value, kind of quantity).
+    """
+
+    number: int
+    time: float
+    dt: float
+    outcome: Outcome
+    cuts: int
+    columns: dict[str, tuple[float, str]] = field(default_factory=dict)
+
+
+Recorder = Callable[[StepReport], None]
+
+
+def run(
+    mechanics: Mechanics,
+    until: float,
+    control: StepControl,
+    record: Recorder = lambda _: None,
+    stop: Callable[[StepReport], bool] = lambda _: False,
+) -> StepReport | None:
+    """Advance to a time. Collective.
+
+    Ctrl-C and SIGTERM end the run cleanly after the current step.
+
+    Args:
+        mechanics: The problem; it goes on from its committed state.
+        until: Time to reach [time].
+        control: Step sizes.
+        record: Called on all ranks after each accepted step.
+        stop: Asked on all ranks after each accepted step with reduced numbers; True ends the run.
+
+    Returns:
+        The last report, None if no step was needed.
+
+    Raises:
+        StepError: The smallest step was reached; says when, where and why.
+        ValueError: `until` is not later than the committed time.
+    """
+    state = mechanics.state
+    require("until", until, until > state.time_old, f"> the present time {state.time_old}")
+    corners = [c for c in (*mechanics.corners, until) if state.time_old < c <= until]
+    dt, report, number = control.first, None, 0
+    with _interruptible(state.mesh.comm) as interrupted:
+        while state.time_old < until:
+            corner = min(c for c in corners if c > state.time_old)
+            report = _advance(mechanics, control, dt, corner)
+            number += 1
+            report.number = number
+            record(report)
+            if stop(report) or interrupted():
+                break
+            dt = _next_step(control, report, dt, at_corner=state.time_old == corner)
+    return report
+
+
+def _advance(mechanics: Mechanics, control: StepControl, dt: float, corner: float) -> StepReport:
+    """One accepted step of at most dt that does not pass the corner."""
+    state, cuts = mechanics.state, 0
+    while True:
+        start = state.time_old
+        end = corner if start + (1 + _SLIVER) * dt >= corner else start + dt
+        outcome, refusal = _attempt(mechanics, control, end)
+        if refusal is None:
+            size = end - start
+            mechanics.commit()
+            return StepReport(0, end, size, outcome, cuts, mechanics.record())
+        mechanics.rollback()
+        cuts += 1
+        dt = control.cut * (end - start)
+        logger.info("step to %.6g rejected (%s); next try %.3g", end, refusal, dt)
+        if dt < control.smallest:
+            raise StepError(
+                f"no step from time {start:.6g} of {dt / control.cut:.3g} or more succeeds "
+                f"(smallest = {control.smallest:.3g}): {refusal}"
+            )
+
+
+def _attempt(mechanics: Mechanics, control: StepControl, end: float) -> tuple[Outcome, str | None]:
+    """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
+    for line_search in control.line_searches:
+        mechanics.rollback()
+        mechanics.begin(end)
+        outcome = mechanics.solve(line_search)
+        if outcome.converged:
+            break
+    else:
+        where = mechanics.diagnose()
+        return outcome, f"{outcome.message} after {outcome.iterations} iterations" + (f"; {where}" if where else "")
+    before = mechanics.audit.closure
+    mechanics.evaluate()
+    growth = mechanics.damage_increment()
+    if control.damage is not None and growth > control.damage:
+        return outcome, f"damage grows by {growth:.3g}, more than {control.damage:g}"
+    drift = abs(mechanics.trial_audit.closure - before)
+    if control.closure is not None and drift > control.closure:
+        return outcome, f"energy closure changes by {drift:.2g}, more than {control.closure:g}"
+    return outcome, None
+
+
+def _next_step(control: StepControl, report: StepReport, dt: float, *, at_corner: bool) -> float:
+    """Grow after an easy step, keep the size of a cut one, start anew at a corner."""
+    if at_corner:
+        return control.first
+    size = min(dt, report.dt) if report.cuts else dt
+    if not report.cuts and report.outcome.iterations <= control.easy:
+        size *= control.growth
+    return min(size, control.largest)
+
+
+@contextmanager
+def _interruptible(comm: MPI.Comm) -> Iterator[Callable[[], bool]]:
+    """Turn the first SIGINT or SIGTERM into a question answered alike on all ranks."""
+    asked = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        if asked and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        asked = True
+        logger.warning("signal %s: the run ends after the current step", signal.Signals(number).name)
+
+    previous = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(comm.allreduce(asked, op=MPI.LOR))
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)

@@ -1,0 +1,79 @@
+"""What a term of the virtual work can do.
+
+The object that owns a term writes it: its form, its moving constants, its history and its share of the energy audit.
+`cutsim.mechanics` only adds terms up.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import ufl
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from cutsim.kinematics import Expr
+
+#: Entries of the energy audit; the external work equals their sum (THEORY §6).
+ENTRIES = ("strain", "cohesive_stored", "fracture", "friction", "contact", "viscous")
+
+
+class Term:
+    """A term of the virtual work; every method but `residual` has a neutral default.
+
+    Attributes:
+        name: Name in messages and in the columns of the history.
+        symmetric: Whether the tangent of the term is symmetric.
+    """
+
+    name: str = "term"
+    symmetric: bool = True
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Internal minus external virtual work."""
+        raise TypeError(f"{type(self).__name__} has to write its virtual work")
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+        """Maps from mesh entities to the cells of submeshes on which coefficients of the term live."""
+        return {}
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times the stepping has to meet exactly."""
+        return ()
+
+    def begin(self, time: float) -> None:
+        """Move constants to their value at the end of the step."""
+
+    def augment(self) -> bool:
+        """Improve a multiplier after equilibrium; True if the step has to be solved again. Collective."""
+        return False
+
+    def evaluate(self) -> None:
+        """Compute trial history and energies from the converged trial displacement. Collective."""
+
+    def energies(self) -> dict[str, float]:
+        """Trial value of the audit entries this term contributes to [energy]. Collective."""
+        return {}
+
+    def external_work(self) -> float:
+        """External work that enters through this term in the trial step [energy]. Collective."""
+        return 0.0
+
+    def damage_increment(self) -> float:
+        """Largest growth of damage at a point in the trial step [–]. Collective."""
+        return 0.0
+
+    def diagnose(self) -> str | None:
+        """After a failed solve: what is wrong in this term, in words, or None. Collective."""
+        return None
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity). Collective."""
+        return {}
+
+    def rollback(self) -> None:
+        """Forget the trial step: constants back to the committed time."""
+
+    def commit(self) -> None:
+        """Adopt trial history."""
