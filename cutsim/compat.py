@@ -1,7 +1,5 @@
 """Everything that depends on the installed dolfinx: compiling forms, and the cache of compiled kernels."""
 
-from __future__ import annotations
-
 import fcntl
 import hashlib
 import os

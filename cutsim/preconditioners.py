@@ -1,7 +1,5 @@
 """Linear solvers for the tangent: which preconditioner fits, how it is built, and when it is rebuilt."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,6 +11,8 @@ from petsc4py import PETSc
 
 #: Unknowns up to which a factorisation is the fastest, by dimension of space.
 DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 15_000}
+#: Unknowns up to which a factorisation is worth trying when everything else failed.
+FALLBACK_LIMIT = 200_000
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,8 @@ def preset_for(n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gd
     Returns:
         The preset.
     """
-    factor = {"pc_type": "cholesky" if symmetric else "lu", "pc_factor_mat_solver_type": "mumps"}
     if n_dofs <= DIRECT_LIMIT[gdim]:
-        return Preset("direct", _gmres(1e-6, 20), factor, patience=8)
+        return _direct(symmetric)
     # On several ranks SOR is a block method, which needs Chebyshev to bound it.
     smoother = "richardson" if ranks == 1 else "chebyshev"
     amg = {
@@ -63,8 +62,30 @@ def preset_for(n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gd
         "mg_levels_pc_type": "sor",
     }
     if has_interface:
-        return Preset("crack", _gmres(1e-4, 200), amg, patience=40, strip=factor)
+        return Preset("crack", _gmres(1e-4, 200), amg, patience=40, strip=_factor(symmetric))
     return Preset("bulk", _gmres(1e-4, 200), amg, patience=30)
+
+
+def fallback_for(failed: Preset, n_dofs: int, symmetric: bool) -> Preset | None:
+    """What to try when a freshly built preconditioner has failed.
+
+    Args:
+        failed: The preset that failed.
+        n_dofs: Global number of unknowns.
+        symmetric: Whether the tangent is symmetric.
+
+    Returns:
+        A factorisation, or None where that is what failed or would not fit.
+    """
+    return None if failed.name == "direct" or n_dofs > FALLBACK_LIMIT else _direct(symmetric)
+
+
+def _direct(symmetric: bool) -> Preset:
+    return Preset("direct", _gmres(1e-6, 20), _factor(symmetric), patience=8)
+
+
+def _factor(symmetric: bool) -> dict[str, Any]:
+    return {"pc_type": "cholesky" if symmetric else "lu", "pc_factor_mat_solver_type": "mumps"}
 
 
 def _gmres(rtol: float, max_it: int) -> dict[str, Any]:
@@ -132,9 +153,9 @@ def strip_dofs(V: fem.FunctionSpace, interface_dofs: NDArray[np.int32]) -> NDArr
 class LaggedPC:
     """PETSc python preconditioner that keeps an inner one until it has gone stale.
 
-    The inner one is built when there is none, when the last linear solve failed, when it took more iterations
-    than `patience` and than 1.5 times those right after the build, and on `refresh`. All ranks see the same
-    iteration counts, so the decision is collective.
+    The inner one is built when there is none, when the last linear solve took more iterations than `patience`
+    and than 1.5 times those right after the build, and on `refresh`, to be called after a failure. All ranks see
+    the same iteration counts, so the decision is collective.
 
     Args:
         prefix: Options prefix of the inner preconditioner.
@@ -151,7 +172,7 @@ class LaggedPC:
         self._prefix, self._patience = prefix, patience
         self._limit = float(patience)
         self._stale = True
-        self._inner: PETSc.PC | None = None
+        self._inner: Any = None
 
     def refresh(self, *, pattern: bool = False) -> None:
         """Rebuild at the next linear solve.
@@ -163,16 +184,15 @@ class LaggedPC:
         if pattern:
             self._free()
 
-    def observe(self, iterations: int, converged: bool) -> None:
-        """Take note of a finished linear solve.
+    def observe(self, iterations: int) -> None:
+        """Take note of a linear solve that met its tolerance.
 
         Args:
             iterations: Krylov iterations it took.
-            converged: Whether it met its tolerance.
         """
         if self.fresh:
             self._limit = max(self._patience, 1.5 * iterations)
-        self._stale |= not converged or iterations > self._limit
+        self._stale = iterations > self._limit
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Called by PETSc when the tangent has changed."""
@@ -216,12 +236,10 @@ class StripCycle(LaggedPC):
         symmetric: Whether the tangent is symmetric.
     """
 
-    def __init__(
-        self, prefix: str, patience: int, strip_prefix: str, dofs: NDArray[np.int32], symmetric: bool
-    ) -> None:
+    def __init__(self, prefix: str, patience: int, strip_prefix: str, dofs: NDArray[np.int32], symmetric: bool) -> None:
         super().__init__(prefix, patience)
         self._strip_prefix, self._dofs, self._symmetric = strip_prefix, dofs, symmetric
-        self._strip: PETSc.PC | None = None
+        self._strip: Any = None
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Called by PETSc when the tangent has changed."""
@@ -266,6 +284,28 @@ class StripCycle(LaggedPC):
             for thing in (self._strip, self._is, self._B, self._b, self._c, self._r, self._z):
                 thing.destroy()
             self._strip = None
+
+
+def create_lagged(
+    preset: Preset,
+    prefix: str,
+    V: fem.FunctionSpace,
+    interface_dofs: NDArray[np.int32] | None,
+    symmetric: bool,
+) -> LaggedPC:
+    """The preconditioner of a preset, to be made the context of a PETSc python preconditioner. Collective.
+
+    Args:
+        preset: The preset.
+        prefix: Options prefix of the problem; the kept preconditioner adds the name of the preset.
+        V: The displacement space.
+        interface_dofs: Owned (blocked) dofs on both faces of the cracks, if the preset has a strip.
+        symmetric: Whether the tangent is symmetric.
+    """
+    kept = f"{prefix}{preset.name}_"
+    if not preset.strip or interface_dofs is None:
+        return LaggedPC(kept, preset.patience)
+    return StripCycle(kept, preset.patience, prefix + "strip_", strip_dofs(V, interface_dofs), symmetric)
 
 
 def _create_pc(prefix: str, A: PETSc.Mat, P: PETSc.Mat) -> PETSc.PC:
