@@ -4,6 +4,7 @@
 PETSc is finalised first, and that waits for the ranks that still compute.
 """
 
+import signal
 import sys
 import time
 import traceback
@@ -27,6 +28,8 @@ def end_together(comm: MPI.Comm) -> None:
 
 
 if __name__ == "__main__":
+    # mpirun passes this signal on, and kills the ranks where it gets SIGTERM itself.
+    signal.signal(signal.SIGUSR1, lambda number, frame: signal.raise_signal(signal.SIGTERM))
     comm = MPI.COMM_WORLD.Dup()  # its messages mix with no others
     try:
         run_command_line(sys.argv[1:])

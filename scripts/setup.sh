@@ -120,7 +120,7 @@ install_packages() {
     mapfile -t packages < <(missing_packages)
     ((${#packages[@]})) || return 0
     can_be_root || die "This needs root rights, or sudo that does not ask when there is no terminal." \
-        "Let an administrator install: ${packages[*]}"
+        "Or let an administrator install (on Debian 12 from the suite trixie): ${packages[*]}"
     begin "refreshing the package lists (apt-get update)"
     apt update || say "some lists could not be refreshed; going on with those there are"
     if [[ $(apt-cache policy) == *o=Debian,*n=bookworm,* ]]; then use_trixie; fi
