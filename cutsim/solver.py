@@ -22,9 +22,10 @@ from cutsim.preconditioners import LaggedPC, Preset, create_lagged, fallback_for
 log = logging.getLogger(__name__)
 
 LINE_SEARCHES = ("l2", "bt", "basic")
-#: Rounding level of the residual, as a fraction of the nodal forces diag(K) u that cancel in it.
+#: Rounding level of the residual, as a fraction of the nodal forces ||diag(K)|| (max |u| + h) that cancel in it. The
+#: cell size h stands for the deformation gradient, which is known within the rounding of 1 however small u is.
 ROUNDING = 1e-14
-#: A prescribed displacement holds when it is met within this fraction of the largest displacement.
+#: A prescribed displacement holds when it is met within this fraction of max |u| + h.
 BC_ROUNDING = 1e-12
 #: Growth of the residual at which an iteration is given up.
 GROWTH = 1e6
@@ -69,7 +70,7 @@ class NonlinearProblem:
     the first iteration. Converged means that the prescribed values hold and that the norm of the free rows of F is
     at most `rtol` times the force scale. The force scale is the norm of the reactions, of the present iterate or
     of the last converged solve, whichever is larger; without any Dirichlet condition it is the norm of F at the
-    start. A state free of forces is accepted when F is down to rounding, 1e-14 ||diag(K) u||.
+    start. A state free of forces is accepted when F is down to rounding, 1e-14 ||diag(K)|| (max |u| + h).
 
     Args:
         F: Residual, linear in a test function of the space of u: internal minus external virtual work.
@@ -138,6 +139,9 @@ class NonlinearProblem:
             dofs = bc.dof_indices()[0]
             self._fixed[dofs[dofs < self._n]] = True
         self._previous_scale = 0.0
+        cells = np.arange(V.mesh.topology.index_map(V.mesh.topology.dim).size_local, dtype=np.int32)
+        h = np.max(V.mesh.h(V.mesh.topology.dim, cells), initial=0.0)
+        self._h = self._comm.allreduce(h, MPI.MAX)
 
     def _create_matrix(self) -> None:
         V = self.u.function_space
@@ -219,6 +223,7 @@ class NonlinearProblem:
         for bc in self.bcs:
             bc.set(self._g.array, None, 1.0)
         self._residuals: list[float] = []
+        self._size = 0.0
         self._scale = self._previous_scale
         iterations = linear = 0
         while True:
@@ -248,7 +253,7 @@ class NonlinearProblem:
         if reason > 0:
             return "converged"
         if reason == _Reason.DIVERGED_MAX_IT:
-            return f"{self._max_it} iterations without convergence"
+            return f"no convergence in {self._max_it} iterations"
         if reason == _Reason.DIVERGED_LINEAR_SOLVE and not self._finite_tangent:
             return _NOT_FINITE
         return _SENTENCES.get(reason, f"PETSc SNES reason {reason}")
@@ -317,12 +322,14 @@ class NonlinearProblem:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Called by SNES: reduce the local numbers, then judge."""
         f, x = snes.getFunction()[0].array_r, snes.getSolution().array_r
-        squares = [f[~self._fixed], self._reaction, self._diagonal.array_r * x if self._residuals else x[:0]]
-        free, reaction, nodal = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
+        squares = [f[~self._fixed], self._reaction, self._diagonal.array_r[~self._fixed]]
+        free, reaction, stiffness = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
         jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self._fixed], x))
-        return self._judge(iteration, free, reaction, nodal, jump <= BC_ROUNDING * size)
+        self._size = max(self._size, size)
+        length = self._size + self._h
+        return self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
 
-    def _judge(self, iteration: int, free: float, reaction: float, nodal: float, bcs_hold: bool) -> int:
+    def _judge(self, iteration: int, free: float, reaction: float, floor: float, bcs_hold: bool) -> int:
         """Decide from global numbers only, so that every rank decides alike."""
         if iteration > 0 or not self._residuals:  # a start after a cured linear solve is no new iterate
             self._residuals.append(free)
@@ -331,7 +338,7 @@ class NonlinearProblem:
         self._scale = max(self._previous_scale, self._force)
         if not np.isfinite(free):
             return _Reason.DIVERGED_FNORM_NAN
-        if bcs_hold and free <= max(self._rtol * self._scale, ROUNDING * nodal):
+        if bcs_hold and free <= max(self._rtol * self._scale, floor):
             return _Reason.CONVERGED_FNORM_RELATIVE
         if free > GROWTH * max(start, self._scale):
             return _Reason.DIVERGED_DTOL

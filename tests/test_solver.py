@@ -1,0 +1,391 @@
+"""The nonlinear solver and its preconditioners against linear algebra, closed forms and bounds on iterations."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem, mesh
+from dolfinx.fem import petsc
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from cutsim import preconditioners
+from cutsim.compat import jit_cache
+from cutsim.preconditioners import fallback_for, preset_for, rigid_body_modes
+from cutsim.solver import NonlinearProblem
+from cutsim.space import cracked_space
+
+WORLD = MPI.COMM_WORLD
+E, NU = 1.0, 0.3
+G, LAMBDA = E / (2 * (1 + NU)), E * NU / ((1 + NU) * (1 - 2 * NU))
+EXACT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
+
+
+def square(comm=WORLD, n=8):
+    return mesh.create_unit_square(comm, n, n, mesh.CellType.quadrilateral, ghost_mode=mesh.GhostMode.shared_facet)
+
+
+def small_strain(u, v, modulus=1.0):
+    eps = ufl.sym(ufl.grad(u))
+    sigma = 2 * G * eps + LAMBDA * ufl.tr(eps) * ufl.Identity(len(u))
+    return modulus * ufl.inner(sigma, ufl.sym(ufl.grad(v))) * ufl.dx
+
+
+def neo_hookean(u, v):
+    F = ufl.Identity(len(u)) + ufl.grad(u)
+    J = ufl.det(F)
+    W = G / 2 * (ufl.inner(F, F) - len(u)) - G * ufl.ln(J) + LAMBDA / 2 * ufl.ln(J) ** 2
+    return ufl.derivative(W, u, v) * ufl.dx
+
+
+def clamped(V, value, at):
+    """Displacement `value` (a Constant, so that it can change) where the last coordinate is `at`."""
+    gdim = V.mesh.geometry.dim
+    return fem.dirichletbc(value, fem.locate_dofs_geometrical(V, lambda x: np.isclose(x[gdim - 1], at)), V)
+
+
+class Block:
+    """Unit square or cube, bottom clamped, top displaced by `top.value`."""
+
+    def __init__(self, domain, residual=neo_hookean, V=None, **options):
+        gdim = domain.geometry.dim
+        self.V = fem.functionspace(domain, ("Lagrange", 1, (gdim,))) if V is None else V
+        self.u = fem.Function(self.V)
+        self.top = fem.Constant(domain, np.zeros(gdim))
+        bcs = [clamped(self.V, fem.Constant(domain, np.zeros(gdim)), 0.0), clamped(self.V, self.top, 1.0)]
+        options = {"petsc_options_prefix": "block_", "symmetric": True, "bcs": bcs, **options}
+        self.problem = NonlinearProblem(residual(self.u, ufl.TestFunction(self.V)), self.u, **options)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.problem.destroy()
+
+    def reaction(self, at=1.0):
+        """Resultant on the face where the last coordinate is `at`."""
+        gdim, n = self.V.mesh.geometry.dim, self.V.dofmap.index_map.size_local
+        here = np.isclose(self.V.tabulate_dof_coordinates()[:n, gdim - 1], at)
+        forces = self.problem.reactions().array.reshape(n, gdim)
+        return self.V.mesh.comm.allreduce(forces[here].sum(axis=0))
+
+
+@pytest.mark.mpi
+def test_a_linear_problem_takes_one_iteration():
+    """Uniform strain is in the space, so the patch test must hold to rounding."""
+    domain = square()
+    V = fem.functionspace(domain, ("Lagrange", 1, (2,)))
+    u, exact = fem.Function(V), fem.Function(V)
+    exact.interpolate(lambda x: np.array([0.1 * x[0] + 0.2 * x[1], -0.3 * x[0] + 0.05 * x[1]]))
+    domain.topology.create_connectivity(1, 2)
+    rim = fem.locate_dofs_topological(V, 1, mesh.exterior_facet_indices(domain.topology))
+    F = small_strain(u, ufl.TestFunction(V))
+    with NonlinearProblem(F, u, petsc_options_prefix="a_", bcs=[fem.dirichletbc(exact, rim)]) as problem:
+        outcome = problem.solve()
+        assert outcome.converged and outcome.iterations == 1 and len(outcome.residuals) == 2
+        assert problem.solve().iterations == 0
+    np.testing.assert_allclose(u.x.array, exact.x.array, atol=1e-13)
+
+
+def test_newton_is_quadratic():
+    with Block(square(), petsc_options=EXACT, rtol=1e-13) as block:
+        block.top.value[:] = 0.0, 2.0
+        outcome = block.problem.solve("basic")
+    assert outcome.converged
+    logs = np.log([r for r in outcome.residuals if r > 1e-12])
+    assert (logs[-1] - logs[-2]) / (logs[-2] - logs[-3]) >= 1.9
+
+
+@pytest.mark.mpi
+def test_prescribed_increments_are_lifted_through_the_tangent():
+    """Written into u, 40 % of stretch in one row of flat cells would invert none but strain one row by 3.2."""
+    with Block(square()) as block:
+        block.top.value[:] = 0.0, 0.4
+        outcome = block.problem.solve("basic")
+        assert outcome.converged and outcome.iterations <= 6
+        u = block.u.x.array.reshape(-1, 2)
+        assert np.all(u[np.isclose(block.V.tabulate_dof_coordinates()[:, 1], 1.0)] == [0.0, 0.4])
+
+
+def spring(root, domain):
+    """Springs atan(5 (u - root)) at the vertices: from far away a full Newton step overshoots ever more."""
+    V = fem.functionspace(domain, ("Lagrange", 1))
+    u = fem.Function(V)
+    lumped = ufl.dx(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
+    F = ufl.atan(5 * (u - root)) * ufl.TestFunction(V) * lumped
+    u.x.array[:] = root + 0.8
+    return F, u
+
+
+@pytest.mark.mpi
+def test_backtracking_does_not_spoil_the_iterate():
+    F, u = spring(1.5, square())
+    with NonlinearProblem(F, u, petsc_options_prefix="b_") as problem:
+        outcome = problem.solve("bt")
+    x, residuals = 4.0, [1.0]  # the same in one unknown, 5 (u - root), with PETSc's sufficient decrease
+    while residuals[-1] > 1e-8:
+        x, residual = backtrack(x)
+        residuals.append(residual)
+    assert outcome.converged
+    np.testing.assert_allclose(u.x.array, 1.5, atol=1e-8)
+    np.testing.assert_allclose(outcome.residuals[:3], residuals[:3], rtol=1e-6)
+    assert outcome.iterations == len(residuals) - 1
+
+
+def backtrack(x):
+    """One Newton step for atan(x) with the cubic backtracking of Dennis and Schnabel, A6.3.1."""
+    f = np.arctan(x)
+    step = -f * (1 + x**2)
+    slope, t = -(f**2), 1.0
+
+    def energy(t):
+        return 0.5 * np.arctan(x + t * step) ** 2
+
+    t_old = None
+    while energy(t) > 0.5 * f**2 + 1e-4 * t * slope:
+        if t_old is None:
+            new = -slope / (2 * (energy(t) - 0.5 * f**2 - slope))
+        else:
+            a, b = (energy(s) - 0.5 * f**2 - s * slope for s in (t, t_old))
+            c3 = (a / t**2 - b / t_old**2) / (t - t_old)
+            c2 = (-t_old * a / t**2 + t * b / t_old**2) / (t - t_old)
+            new = (-c2 + np.sqrt(c2**2 - 3 * c3 * slope)) / (3 * c3)
+        t_old, t = t, min(max(new, 0.1 * t), 0.5 * t)
+    x = x + t * step
+    return x, abs(np.arctan(x)) / np.arctan(4.0)
+
+
+@pytest.mark.mpi
+def test_full_steps_diverge_and_say_so():
+    F, u = spring(1.5, square())
+    with NonlinearProblem(F, u, petsc_options_prefix="b_", petsc_options={"snes_max_it": 5}) as problem:
+        outcome = problem.solve("basic")
+    assert not outcome.converged and outcome.reason < 0 and np.max(np.abs(u.x.array)) > 10.0
+    assert outcome.message == "no convergence in 5 iterations"
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("line_search", ["l2", "bt", "basic"])
+def test_inverted_elements_end_in_a_sentence_or_are_avoided(line_search):
+    with Block(square()) as block:
+        block.top.value[:] = 0.0, -1.5  # through the bottom: no solution
+        outcome = block.problem.solve(line_search)
+        assert not outcome.converged and " " in outcome.message
+        block.u.x.array[:] = 0.0
+        block.top.value[:] = 0.0, -0.2
+        assert block.problem.solve(line_search).converged
+
+
+@pytest.mark.mpi
+def test_a_start_that_is_not_finite_is_named():
+    with Block(square()) as block:
+        block.u.interpolate(lambda x: np.array([0.0 * x[0], -1.5 * x[1]]))
+        outcome = block.problem.solve()
+    assert not outcome.converged and "inverted" in outcome.message and outcome.iterations == 0
+
+
+def test_a_tangent_that_is_not_finite_is_named():
+    domain = square()
+    V = fem.functionspace(domain, ("Lagrange", 1))
+    u = fem.Function(V)
+    F = (ufl.sqrt(u) - 1.0) * ufl.TestFunction(V) * ufl.dx  # slope 1/0 at u = 0
+    with NonlinearProblem(F, u, petsc_options_prefix="c_") as problem:
+        outcome = problem.solve()
+    assert not outcome.converged and "tangent not finite" in outcome.message
+
+
+@pytest.mark.mpi
+def test_reactions_balance_the_load():
+    domain = square()
+    load = np.array([0.03, -0.07])
+
+    def residual(u, v):
+        return neo_hookean(u, v) - ufl.dot(fem.Constant(domain, load), v) * ufl.dx
+
+    with Block(domain, residual) as block:
+        block.top.value[:] = 0.1, 0.2
+        assert block.problem.solve().converged
+        np.testing.assert_allclose(block.reaction(0.0) + block.reaction(1.0), -load, atol=1e-8)
+        free = np.linalg.norm((block.problem.residual() - block.problem.reactions()).array)
+        assert free <= 1e-8 * np.linalg.norm(block.problem.reactions().array) or WORLD.size > 1
+
+
+@pytest.mark.mpi
+def test_unloading_to_a_state_free_of_forces_converges():
+    with Block(square()) as block:
+        for stretch in (0.2, 0.0):
+            block.top.value[1] = stretch
+            assert block.problem.solve().converged
+        assert block.problem.solve().iterations == 0
+        np.testing.assert_allclose(block.u.x.array, 0.0, atol=1e-9)
+
+
+@pytest.mark.mpi
+def test_ranks_agree_with_one():
+    def stretched(comm):
+        with Block(square(comm)) as block:
+            block.top.value[:] = 0.1, 0.3
+            outcome = block.problem.solve()
+            assert outcome.converged
+            return [*block.reaction(), *outcome.residuals[:3]]
+
+    np.testing.assert_allclose(stretched(WORLD), stretched(MPI.COMM_SELF), rtol=1e-9)
+
+
+def test_options_stay_with_their_problem():
+    everywhere = PETSc.Options()
+    everywhere["ksp_type"], everywhere["snes_linesearch_type"] = "bcgs", "cp"
+    before = dict(everywhere.getAll())
+    try:
+        with Block(square(), petsc_options={"snes_max_it": 7}) as block:
+            assert block.problem.snes.getKSP().getType() == "gmres"
+            assert block.problem.snes.getTolerances()[3] == 7
+            assert everywhere["block_snes_max_it"] == "7"
+            block.problem.solve()
+        assert everywhere.getAll() == before
+    finally:
+        everywhere.delValue("ksp_type")
+        everywhere.delValue("snes_linesearch_type")
+
+
+def test_a_linear_solver_of_the_user_replaces_the_preset():
+    with Block(square(), petsc_options={"pc_type": "jacobi", "ksp_type": "cg", "ksp_rtol": 1e-10}) as block:
+        ksp = block.problem.snes.getKSP()
+        assert (ksp.getType(), ksp.getPC().getType()) == ("cg", "jacobi")
+        block.top.value[1] = 0.1
+        assert block.problem.solve().converged
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [({"petsc_options_prefix": ""}, "petsc_options_prefix"), ({"rtol": 0.0}, "rtol"), ({"rtol": np.nan}, "rtol")],
+)
+def test_bad_input_is_named(change, name):
+    with pytest.raises(ValueError, match=name):
+        Block(square(), **change)
+
+
+def test_an_unknown_line_search_is_refused():
+    with Block(square()) as block, pytest.raises(ValueError, match="line_search = 'cubic'.*l2, bt, basic"):
+        block.problem.solve("cubic")
+
+
+@pytest.mark.parametrize(
+    ("n_dofs", "ranks", "has_interface", "gdim", "name", "smoother"),
+    [
+        (15_000, 1, False, 3, "direct", None),
+        (15_000, 3, True, 3, "direct", None),
+        (60_000, 1, True, 2, "direct", None),
+        (100_000, 1, False, 3, "bulk", "richardson"),
+        (100_000, 2, False, 3, "bulk", "chebyshev"),
+        (100_000, 1, True, 3, "crack", "richardson"),
+        (500_000, 2, True, 2, "crack", "chebyshev"),
+    ],
+)
+@pytest.mark.parametrize(("symmetric", "factor"), [(True, "cholesky"), (False, "lu")])
+def test_preset_by_size(n_dofs, ranks, has_interface, gdim, name, smoother, symmetric, factor):
+    preset = preset_for(n_dofs, symmetric, ranks, has_interface, gdim)
+    assert preset.name == name
+    assert preset.kept.get("mg_levels_ksp_type") == smoother
+    factorised = preset.kept if name == "direct" else preset.strip
+    assert factorised.get("pc_type") == (None if name == "bulk" else factor)
+
+
+def test_the_fallback_is_a_factorisation_while_it_fits():
+    bulk = preset_for(100_000, True, 1, False, 3)
+    fallback = fallback_for(bulk, 100_000, True)
+    assert fallback is not None and fallback.name == "direct"
+    assert fallback_for(bulk, 5_000_000, True) is None
+    assert fallback_for(fallback, 100_000, True) is None
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_rigid_bodies_store_no_energy(gdim):
+    create, n = (mesh.create_unit_square, (4, 4)) if gdim == 2 else (mesh.create_unit_cube, (2, 2, 2))
+    V = fem.functionspace(create(WORLD, *n), ("Lagrange", 2, (gdim,)))
+    A = petsc.assemble_matrix(fem.form(small_strain(ufl.TrialFunction(V), ufl.TestFunction(V))))
+    A.assemble()
+    modes = rigid_body_modes(V).getVecs()
+    assert len(modes) == 3 * (gdim - 1)
+    for mode in modes:
+        assert (A * mode).norm() < 1e-12 * A.norm()
+    np.testing.assert_allclose([[v.dot(w) for v in modes] for w in modes], np.eye(len(modes)), atol=1e-12)
+
+
+def test_rigid_bodies_need_a_displacement():
+    with pytest.raises(ValueError, match="V has 1 components in 2 dimensions"):
+        rigid_body_modes(fem.functionspace(square(), ("Lagrange", 1)))
+
+
+class GluedBlocks(Block):
+    """Two halves of a cube held together by springs of `stiffness` per area, solved as if it were large."""
+
+    def __init__(self, monkeypatch, n=6, with_strip=True):
+        monkeypatch.setattr(preconditioners, "DIRECT_LIMIT", {3: 0})
+        hexahedron, ghosts = mesh.CellType.hexahedron, mesh.GhostMode.shared_facet
+        domain = mesh.create_unit_cube(WORLD, n, n, n, hexahedron, ghost_mode=ghosts)
+        facets = mesh.locate_entities(domain, 2, lambda x: np.isclose(x[2], 0.5))
+        V = cracked_space(domain, ("Lagrange", 1, (3,)), facets)
+        tags = mesh.meshtags(domain, 2, facets, np.ones(len(facets), dtype=np.int32))
+        dS = ufl.Measure("dS", domain=domain, subdomain_data=tags, subdomain_id=1)
+        self.stiffness = fem.Constant(domain, 1.0)
+        crack = fem.locate_dofs_geometrical(V, lambda x: np.isclose(x[2], 0.5))
+        crack = crack[crack < V.dofmap.index_map.size_local]
+
+        def residual(u, v):
+            return small_strain(u, v) + self.stiffness * ufl.dot(ufl.jump(u), ufl.jump(v)) * dS
+
+        super().__init__(domain, residual, V, interface_dofs=crack if with_strip else None)
+        self.top.value[:] = 0.0, 0.1, 0.2
+
+    def iterations(self, stiffness):
+        """Krylov iterations of each Newton iteration, from u = 0."""
+        self.stiffness.value = stiffness
+        self.u.x.array[:] = 0.0
+        outcome = self.problem.solve()
+        assert outcome.converged
+        return outcome.linear_iterations / outcome.iterations
+
+
+@pytest.mark.mpi
+def test_a_crack_of_any_stiffness_takes_few_iterations(monkeypatch):
+    """The multigrid part is built once, at the first stiffness, and kept."""
+    n = 6
+    with GluedBlocks(monkeypatch, n) as blocks:
+        for over_E_per_h in (1.0, 1e1, 1e2, 1e3, 1e4, 1e-2, -0.02):
+            assert blocks.iterations(over_E_per_h * E * n) <= 20
+        assert blocks.problem._lagged.builds == 1
+
+
+def test_the_strip_matters(monkeypatch):
+    with GluedBlocks(monkeypatch, with_strip=False) as blocks:
+        blocks.iterations(6.0)
+        assert blocks.iterations(6e3) > 20
+
+
+@pytest.mark.mpi
+def test_a_stale_preconditioner_is_rebuilt():
+    """One half becomes 1e4 times as stiff: the factorisation of before is of no use, and replaced."""
+    domain = square(n=16)
+    modulus = fem.Constant(domain, 1.0)
+    x = ufl.SpatialCoordinate(domain)
+    island = ufl.conditional(ufl.lt((x[0] - 0.5) ** 2 + (x[1] - 0.5) ** 2, 0.1), modulus, 1.0 + 10 * x[0])
+    with Block(domain, lambda u, v: small_strain(u, v, island)) as block:
+        iterations = []
+        for value in (1.0, 1e4, 1e4):
+            modulus.value = value
+            block.u.x.array[:] = 0.0
+            block.top.value[:] = 0.1, 0.2
+            outcome = block.problem.solve()
+            assert outcome.converged
+            iterations.append(outcome.linear_iterations)
+        assert iterations[0] == 1
+        assert block.problem._lagged.builds >= 2
+        assert iterations[2] <= 2
+
+
+def test_a_source_left_half_built_is_removed(tmp_path):
+    for name in ("whole.c", "whole.c.cached", "half.c", "half.o"):
+        (tmp_path / name).touch()
+    with jit_cache(MPI.COMM_SELF, tmp_path):
+        assert {p.name for p in tmp_path.glob("*.c*")} == {"whole.c", "whole.c.cached"}
