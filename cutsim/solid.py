@@ -37,6 +37,9 @@ class Solid(Term):
             On simplices of degree 1 both coincide, and a warning says that the element locks.
         viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
 
+    Attributes:
+        measures: Measures over the body that integrate the two parts of the strain energy.
+
     Raises:
         ValueError: A parameter is outside its range.
     """
@@ -63,7 +66,7 @@ class Solid(Term):
         self.plane = plane
         self.viscosity = viscosity
         self.cells = cells
-        self._dx, self._dx_volumetric = self._measures(volumetric)
+        self.measures = self._choose_measures(volumetric)
         self._energy_form = form(self._stored(state.u))
         self._viscous_form = form(self._viscous_work()) if viscosity else None
         self._viscous = self._viscous_old = 0.0
@@ -93,7 +96,7 @@ class Solid(Term):
         if self.viscosity:
             E = green_lagrange(deformation_gradient(self.state.u))
             rate = (E - green_lagrange(deformation_gradient(self.state.u_old))) / self.state.dt
-            work += self.viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self._dx
+            work += self.viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
         return work
 
     def evaluate(self) -> None:
@@ -113,7 +116,7 @@ class Solid(Term):
     def smallest_jacobian(self) -> float:
         """Smallest det F at the integration points. Collective."""
         cell = basix.CellType[self.state.mesh.topology.cell_name()]
-        points = basix.make_quadrature(cell, self._dx.metadata()["quadrature_degree"])[0]
+        points = basix.make_quadrature(cell, self.measures[0].metadata()["quadrature_degree"])[0]
         owned = self.state.mesh.topology.index_map(self.state.mesh.topology.dim).size_local
         cells = np.arange(owned, dtype=np.int32) if self.cells is None else self.cells[self.cells < owned]
         J = fem.Expression(ufl.det(self.deformation_gradient(self.state.u)), points)
@@ -125,7 +128,7 @@ class Solid(Term):
         """Adopt the viscous dissipation."""
         self._viscous_old = self._viscous
 
-    def _measures(self, volumetric: str) -> tuple[ufl.Measure, ufl.Measure]:
+    def _choose_measures(self, volumetric: str) -> tuple[ufl.Measure, ufl.Measure]:
         element = self.state.V.ufl_element()
         cell, degree = element.cell_type.name, element.degree
         simplex = cell in ("triangle", "tetrahedron")
@@ -146,8 +149,9 @@ class Solid(Term):
 
     def _stored(self, u: Expr) -> ufl.Form:
         shear, volumetric = self.material.energy(self.deformation_gradient(u))
-        return shear * self._dx + volumetric * self._dx_volumetric
+        dx, dx_volumetric = self.measures
+        return shear * dx + volumetric * dx_volumetric
 
     def _viscous_work(self) -> ufl.Form:
         new, old = (green_lagrange(deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
-        return self.viscosity / self.state.dt * ufl.inner(new - old, new - old) * self._dx
+        return self.viscosity / self.state.dt * ufl.inner(new - old, new - old) * self.measures[0]
