@@ -185,6 +185,11 @@ class NonlinearProblem:
         """The PETSc solver."""
         return self._snes
 
+    @property
+    def preconditioner(self) -> LaggedPC | None:
+        """The preconditioner of the preset: `refresh` it when the sparsity pattern has changed; None if the user's."""
+        return self._lagged
+
     def solve(self, line_search: str | None = None) -> Outcome:
         """Solve from the present u.
 

@@ -106,6 +106,14 @@ def test_prescribed_increments_are_lifted_through_the_tangent():
         assert np.all(u[np.isclose(block.V.tabulate_dof_coordinates()[:, 1], 1.0)] == [0.0, 0.4])
 
 
+def test_prescribed_values_hold_whatever_the_linear_tolerance(monkeypatch):
+    monkeypatch.setattr(preconditioners, "DIRECT_LIMIT", {2: 0})
+    with Block(square(), petsc_options={"ksp_rtol": 0.3, "snes_max_it": 1}) as block:
+        block.top.value[:] = 0.0, 0.1
+        assert not block.problem.solve("basic").converged
+        np.testing.assert_allclose(block.u.x.array.reshape(-1, 2)[:, 1].max(), block.top.value[1], rtol=0.0, atol=1e-15)
+
+
 def spring(root, domain):
     """Springs atan(5 (u - root)) at the vertices: from far away a full Newton step overshoots ever more."""
     V = fem.functionspace(domain, ("Lagrange", 1))
@@ -205,8 +213,10 @@ def test_reactions_balance_the_load():
         block.top.value[:] = 0.1, 0.2
         assert block.problem.solve().converged
         np.testing.assert_allclose(block.reaction(0.0) + block.reaction(1.0), -load, atol=1e-8)
-        free = np.linalg.norm((block.problem.residual() - block.problem.reactions()).array)
-        assert free <= 1e-8 * np.linalg.norm(block.problem.reactions().array) or WORLD.size > 1
+        reactions = block.problem.reactions()
+        assert (block.problem.residual() - reactions).norm() <= 1e-8 * reactions.norm()
+        y = np.repeat(block.V.tabulate_dof_coordinates()[: reactions.local_size // 2, 1], 2)
+        assert np.all(reactions.array[(y > 0.01) & (y < 0.99)] == 0.0)
 
 
 @pytest.mark.mpi
@@ -265,7 +275,7 @@ def test_bad_input_is_named(change, name):
 
 
 def test_an_unknown_line_search_is_refused():
-    with Block(square()) as block, pytest.raises(ValueError, match="line_search = 'cubic'.*l2, bt, basic"):
+    with Block(square()) as block, pytest.raises(ValueError, match=r"line_search = 'cubic'.*l2, bt, basic"):
         block.problem.solve("cubic")
 
 
@@ -354,7 +364,7 @@ def test_a_crack_of_any_stiffness_takes_few_iterations(monkeypatch):
     with GluedBlocks(monkeypatch, n) as blocks:
         for over_E_per_h in (1.0, 1e1, 1e2, 1e3, 1e4, 1e-2, -0.02):
             assert blocks.iterations(over_E_per_h * E * n) <= 20
-        assert blocks.problem._lagged.builds == 1
+        assert blocks.problem.preconditioner.builds == 1
 
 
 def test_the_strip_matters(monkeypatch):
@@ -364,24 +374,29 @@ def test_the_strip_matters(monkeypatch):
 
 
 @pytest.mark.mpi
-def test_a_stale_preconditioner_is_rebuilt():
-    """One half becomes 1e4 times as stiff: the factorisation of before is of no use, and replaced."""
+@pytest.mark.parametrize("contrast", [8.0, 1e4])  # slow after the first, not converged at all after the second
+def test_a_stale_preconditioner_is_rebuilt(contrast):
+    """A stiff island grows in the body: the factorisation of before is of little use, and replaced."""
     domain = square(n=16)
     modulus = fem.Constant(domain, 1.0)
     x = ufl.SpatialCoordinate(domain)
-    island = ufl.conditional(ufl.lt((x[0] - 0.5) ** 2 + (x[1] - 0.5) ** 2, 0.1), modulus, 1.0 + 10 * x[0])
+    island = ufl.conditional(ufl.lt((x[0] - 0.5) ** 2 + (x[1] - 0.5) ** 2, 0.1), modulus, 1.0 + x[0])
     with Block(domain, lambda u, v: small_strain(u, v, island)) as block:
-        iterations = []
-        for value in (1.0, 1e4, 1e4):
+        iterations, builds = [], []
+        for value in (1.0, contrast, contrast):
             modulus.value = value
             block.u.x.array[:] = 0.0
             block.top.value[:] = 0.1, 0.2
             outcome = block.problem.solve()
             assert outcome.converged
             iterations.append(outcome.linear_iterations)
-        assert iterations[0] == 1
-        assert block.problem._lagged.builds >= 2
-        assert iterations[2] <= 2
+            builds.append(block.problem.preconditioner.builds)
+            # one more tangent, so that what the last solve taught can be used
+            modulus.value = 1.01 * value
+            assert block.problem.solve().converged
+        assert (iterations[0], builds[0]) == (1, 1)
+        assert iterations[1] > 8
+        assert iterations[2] < 8 and block.problem.preconditioner.builds == 2
 
 
 def test_a_source_left_half_built_is_removed(tmp_path):
