@@ -98,6 +98,11 @@ class Blade:
         """Distance along the blade from the tip's centre to the beginning of the shank [length]."""
         return (self.half_thickness - self.tip_radius) / tan(self.half_angle)
 
+    def half_width(self, height: float) -> float:
+        """Lateral distance from the plane of symmetry to the flank or shank, a height above the tip [length]."""
+        flank = ((height - self.tip_radius) * sin(self.half_angle) + self.tip_radius) / cos(self.half_angle)
+        return min(flank, self.half_thickness)
+
     def distance(self, x: Expr) -> Expr:
         """Distance to the sharp core (a convex polygon) minus the tip radius [length]."""
         r, width, height = self.tip_radius, self.half_thickness - self.tip_radius, self.flank_height
@@ -181,10 +186,9 @@ class FlatPunch:
         across = ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * r) ** 2) - (self.radius - r)
         below = height + r
         corner = _hypot(across, below, r)
-        inside = ufl.conditional(ufl.gt(across, below), across, below)
-        outside = ufl.conditional(ufl.lt(across, 0), below, ufl.conditional(ufl.lt(below, 0), across, corner))
-        core = ufl.conditional(ufl.And(ufl.lt(across, 0), ufl.lt(below, 0)), inside, outside)
-        return core - r
+        side = ufl.conditional(ufl.lt(below, 0), across, corner)
+        face = ufl.conditional(ufl.lt(across, 0), below, corner)
+        return ufl.conditional(ufl.gt(across, below), side, face) - r
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,85 @@
+"""What the theory tests share: two blocks glued by a crack, their rigid motion, and slopes of remainders."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from dolfinx import mesh
+from mpi4py import MPI
+
+from cutsim.cohesive import Bilinear, Exponential
+from cutsim.interface import Crack
+from cutsim.loads import Support
+from cutsim.materials import LinearElastic
+from cutsim.solid import Solid
+from cutsim.space import cracked_space
+from cutsim.state import State
+
+E, NU = 2.0, 0.3
+# φ_n = 1 and φ_t = ½, the set of the path values in the theory
+EXPONENTIAL = Exponential.from_parameters(toughness=1.0, opening=0.1, shear_toughness=0.5, shear_opening=0.2)
+BILINEAR = Bilinear(penalty=200.0, t_n=2.0, G_I=0.2, t_t=3.0, G_II=0.5, eta=1.7)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """The unit square or cube, cracked in the plane half way up: the last axis is normal to the crack."""
+
+    state: State
+    facets: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @property
+    def gdim(self):
+        return self.state.mesh.geometry.dim
+
+    def crack(self, law=EXPONENTIAL, **options):
+        return Crack(self.state, self.facets, self.lower, law, **{"young": E, **options})
+
+    def solid(self, material=LinearElastic(E, NU), **options):
+        return Solid(self.state, material, **options)
+
+    def drive(self, cells, path, name=None):
+        """Move every node of some cells along a path: a function of time, or zero, for each component."""
+        tdim = self.state.mesh.topology.dim
+        return [
+            Support(self.state, cells, i, value, dim=tdim, name=name and f"{name}_{'xyz'[i]}")
+            for i, value in enumerate(path)
+        ]
+
+    def face(self, axis, at):
+        """Exterior facets where a coordinate has a value."""
+        return mesh.locate_entities_boundary(
+            self.state.mesh, self.state.mesh.topology.dim - 1, lambda x: np.isclose(x[axis], at)
+        )
+
+    def move(self, lower, upper):
+        """Set the displacement: a function of the positions (3, n) → (gdim, n) for each block."""
+        for cells, motion in ((self.lower, lower), (self.upper, upper)):
+            self.state.u.interpolate(lambda x, motion=motion: motion(x)[: self.gdim], cells)
+        self.state.u.x.scatter_forward()
+
+
+def make_blocks(gdim=2, n=2, comm=MPI.COMM_WORLD, cell=None):
+    """Two glued blocks of n × n/2 (× n) cells."""
+    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+    quads = (mesh.CellType.quadrilateral, mesh.CellType.hexahedron)
+    create = (mesh.create_unit_square, mesh.create_unit_cube)[gdim - 2]
+    domain = create(comm, *(n,) * gdim, cell or quads[gdim - 2], partitioner=partitioner)
+    up = gdim - 1
+    facets = mesh.locate_entities(domain, gdim - 1, lambda x: np.isclose(x[up], 0.5))
+    lower = mesh.locate_entities(domain, gdim, lambda x: x[up] < 0.5 + 1e-9)
+    upper = mesh.locate_entities(domain, gdim, lambda x: x[up] > 0.5 - 1e-9)
+    return Blocks(State(cracked_space(domain, ("Lagrange", 1, (gdim,)), facets)), facets, lower, upper)
+
+
+@pytest.fixture
+def blocks():
+    """Makes two glued blocks."""
+    return make_blocks
+
+
+def slopes(steps, remainders):
+    """Slopes of a remainder between successive step sizes, in double logarithm."""
+    return np.diff(np.log(remainders)) / np.diff(np.log(steps))

@@ -1,0 +1,257 @@
+"""Taylor's theorem for every tangent: the remainder of the linearised forces falls with the square of the step."""
+
+import itertools
+
+import numpy as np
+import pytest
+import ufl
+from conftest import BILINEAR, E, EXPONENTIAL, NU, make_blocks, slopes
+from dolfinx import fem, la
+from dolfinx.fem.petsc import assemble_matrix
+
+from cutsim.compat import form
+from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.interface import Surface
+from cutsim.materials import LinearElastic, MooneyRivlin, NeoHookean, StVenantKirchhoff
+from cutsim.tool_contact import ToolContact
+from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
+
+STEPS = np.array([1e-2, 5e-3, 2.5e-3])
+
+
+class Linearised:
+    """Nodal forces of a term and their tangent."""
+
+    def __init__(self, term, state):
+        self.u = state.u
+        residual = term.residual(ufl.TestFunction(state.V))
+        tangent = ufl.derivative(residual, state.u, ufl.TrialFunction(state.V))
+        self._forces, self._tangent = (form(f, entity_maps=term.entity_maps) for f in (residual, tangent))
+
+    def forces(self, u):
+        self.u.x.array[:] = u
+        b = fem.assemble_vector(self._forces)
+        b.scatter_reverse(la.InsertMode.add)
+        return b.array.copy()
+
+    def matrix(self, u):
+        self.u.x.array[:] = u
+        A = assemble_matrix(self._tangent)
+        A.assemble()
+        dense = A[:, :]
+        A.destroy()
+        return dense
+
+    def remainders(self, u, w, steps=STEPS):
+        """|f(u + h w) − f(u) − h K w| / |K w| for each step h."""
+        f, slope = self.forces(u), self.matrix(u) @ w
+        return np.array([np.linalg.norm(self.forces(u + h * w) - f - h * slope) for h in steps]) / np.linalg.norm(slope)
+
+
+def smooth(V, seed, size):
+    """Some smooth field of a given size: forces have no kink in its neighbourhood."""
+    rng = np.random.default_rng(seed)
+    gdim = V.mesh.geometry.dim
+    a, b, c = rng.uniform(-1, 1, (gdim, 3)), rng.uniform(-1, 1, (gdim, 3)), rng.uniform(-1, 1, gdim)
+    w = fem.Function(V)
+    w.interpolate(lambda x: np.array([np.sin(a[i] @ x + c[i]) + 0.5 * np.cos(b[i] @ x) for i in range(gdim)]))
+    return size * w.x.array / np.abs(w.x.array).max()
+
+
+def assert_slope_two(term, state, u, size):
+    """Taylor slope 2 in a direction of a size in which forces change markedly but meet no kink."""
+    problem = Linearised(term, state)
+    w = smooth(state.V, 7, size) + jump_part(state, 8, size)
+    remainders = problem.remainders(u, w)
+    assert remainders[0] > 1e-9, "a linear term: the slope says nothing"
+    assert slopes(STEPS, remainders).min() > 1.95, remainders
+    matrix = problem.matrix(u)
+    asymmetry = np.linalg.norm(matrix - matrix.T) / np.linalg.norm(matrix)
+    assert not term.symmetric or asymmetry < 1e-12
+    return asymmetry
+
+
+def jump_part(state, seed, size):
+    """A smooth field on the upper block only."""
+    w = fem.Function(state.V)
+    field = fem.Function(state.V)
+    field.x.array[:] = smooth(state.V, seed, size)
+    gdim = state.mesh.geometry.dim
+    cells = np.arange(state.mesh.topology.index_map(gdim).size_local, dtype=np.int32)
+    points = state.mesh.geometry.x[state.mesh.geometry.dofmap].mean(axis=1)
+    w.x.array[:] = 0
+    for cell in cells[points[:, gdim - 1] > 0.5]:
+        dofs = state.V.dofmap.cell_dofs(cell)
+        for i in range(gdim):
+            w.x.array[dofs * gdim + i] = field.x.array[dofs * gdim + i]
+    return w.x.array
+
+
+# -- bulk -------------------------------------------------------------------------------------------------------------
+
+HYPERELASTIC = [NeoHookean(E, NU), StVenantKirchhoff(E, NU), MooneyRivlin(0.3, 0.1, 4.0)]
+KINDS = [(3, "strain"), (2, "strain"), (2, "stress")]
+
+
+@pytest.mark.parametrize(
+    ("material", "gdim", "plane"),
+    [(m, *kind) for m in HYPERELASTIC for kind in KINDS if not (isinstance(m, MooneyRivlin) and kind[1] == "stress")],
+    ids=lambda v: type(v).__name__ if v in HYPERELASTIC else v,
+)
+def test_hyperelastic(material, gdim, plane):
+    b = make_blocks(gdim)
+    solid = b.solid(material, plane=plane)
+    assert_slope_two(solid, b.state, smooth(b.state.V, 1, 0.2), 1.0)
+
+
+@pytest.mark.parametrize(("gdim", "plane"), KINDS, ids=["3-D", "plane strain", "plane stress"])
+def test_linear_elastic_has_no_remainder(gdim, plane):
+    b = make_blocks(gdim)
+    solid = b.solid(LinearElastic(E, NU), plane=plane)
+    problem = Linearised(solid, b.state)
+    u, w = smooth(b.state.V, 1, 0.2), smooth(b.state.V, 2, 1.0)
+    assert problem.remainders(u, w, [1.0])[0] < 1e-13
+    matrix = problem.matrix(u)
+    assert np.linalg.norm(matrix - matrix.T) < 1e-13 * np.linalg.norm(matrix)
+
+
+def test_viscosity():
+    b = make_blocks()
+    b.state.u_old.x.array[:] = smooth(b.state.V, 3, 0.1)
+    b.state.begin(0.1)
+    solid = b.solid(NeoHookean(E, NU), viscosity=5.0)
+    assert_slope_two(solid, b.state, smooth(b.state.V, 1, 0.2), 1.0)
+
+
+# -- crack ------------------------------------------------------------------------------------------------------------
+
+# mean jump over the characteristic opening (sliding, opening), and history over it
+JUMPS = {
+    "opening": (0.0, 0.8, 0.0),
+    "sliding": (0.9, 0.02, 0.0),
+    "mixed": (0.7, 0.8, 0.0),
+    "softening": (1.5, 1.8, 0.0),
+    "unloading": (0.7, 0.6, 3.0),
+    "compression": (0.8, -0.3, 0.0),
+    "compression of the damaged bond": (0.8, -0.3, 3.0),
+}
+LAWS = {"exponential": (EXPONENTIAL, 0.1), "bilinear": (BILINEAR, 0.02), "contact only": (None, 0.1)}
+
+
+def separated(b, sliding, opening, wobble):
+    """A deformed state whose jump is nearly the same all over the crack."""
+    gdim = b.gdim
+    base = smooth(b.state.V, 4, 0.15)
+    b.move(lambda x: 0 * x, lambda x: np.array([0 * x[0] + sliding, *([0 * x[0]] * (gdim - 2)), 0 * x[0] + opening]))
+    return base + b.state.u.x.array + jump_part(b.state, 5, wobble)
+
+
+# open, a crack without a law carries nothing; closed, its pressure along the reference normal is linear
+BARE = [("contact only", "current", "compression")]
+
+
+@pytest.mark.parametrize(
+    ("law", "normal", "jump"),
+    [*itertools.product(("exponential", "bilinear"), ("current", "reference"), JUMPS), *BARE],
+)
+def test_crack(law, normal, jump):
+    sliding, opening, kappa = JUMPS[jump]
+    law, scale = LAWS[law]
+    b = make_blocks()
+    crack = b.crack(law, normal=normal, contact=PenaltyContact(30.0))
+    crack._kappa.x.array[:] = 0.9 if law is BILINEAR and kappa else kappa * scale
+    u = separated(b, sliding * scale, opening * scale, 0.01 * scale)
+    if law is BILINEAR and (opening < 0 and normal == "reference" or opening > 0 and kappa):
+        # on the secant T = (1 − d) K δ, whatever the normal; softening in sliding alone is a straight line
+        assert Linearised(crack, b.state).remainders(u, jump_part(b.state, 8, scale), [1e-2])[0] < 1e-9
+    else:
+        assert_slope_two(crack, b.state, u, scale)
+
+
+@pytest.mark.parametrize("law", [EXPONENTIAL, BILINEAR], ids=["exponential", "bilinear"])
+def test_crack_in_three_dimensions(law):
+    scale = LAWS["exponential" if law is EXPONENTIAL else "bilinear"][1]
+    b = make_blocks(3)
+    crack = b.crack(law, contact=PenaltyContact(30.0))
+    assert_slope_two(crack, b.state, separated(b, 0.7 * scale, 0.8 * scale, 0.01 * scale), scale)
+    assert_slope_two(crack, b.state, separated(b, 0.7 * scale, -0.3 * scale, 0.01 * scale), scale)
+
+
+@pytest.mark.parametrize("opening", [-0.003, -0.05], ids=["within the blend", "beyond the blend"])
+def test_blended_and_augmented_contact(opening):
+    b = make_blocks()
+    crack = b.crack(None, contact=PenaltyContact(30.0, blend=0.01), penetration=0.1)
+    crack._multiplier.x.array[:] = 0.15
+    assert_slope_two(crack, b.state, separated(b, 0.01, opening, 1e-4), 0.05)
+
+
+# -- tools ------------------------------------------------------------------------------------------------------------
+
+CONTACT = PenaltyContact(40.0, blend=0.02)
+FRICTION = Coulomb(0.3, 0.01)
+# shape, and a reference point from which it dips into the plane y = 1 (z = 1) at different depths along it
+SHAPES = {
+    "blade": (Blade(0.4, 0.3, 0.6), (0.4, 0.9)),
+    "half blade": (Blade(0.4, 0.3, 0.6, side=1), (0.4, 0.9)),
+    "cylinder": (Ball(0.8), (0.3, 1.7)),
+    "punch": (FlatPunch(0.7, 0.2), (0.15, 0.9)),
+    "plane": (Plane((0.1, -1.0)), (0.5, 0.97)),
+    "blade in 3-D": (Blade(0.4, 0.3, 0.6, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)), (0.4, 0.5, 0.9)),
+    "sphere": (Ball(0.8), (0.3, 0.4, 1.7)),
+    "cylinder in 3-D": (Ball(0.8, (1.0, 0.2, 0.1)), (0.3, 0.4, 1.7)),
+    "punch in 3-D": (FlatPunch(0.5, 0.2, (0.0, 0.0, -1.0)), (0.1, 0.2, 0.93)),
+    "plane in 3-D": (Plane((0.1, 0.1, -1.0)), (0.5, 0.5, 0.97)),
+}
+
+
+def touch(b, shape, place, surfaces, friction):
+    """Contact with a tool that moved a little in the step."""
+    tool = ToolContact(b.state, shape, Path(lambda t: np.array(place)), surfaces, contact=CONTACT, friction=friction)
+    tool.position_old.value[0] += 0.05
+    return tool
+
+
+@pytest.mark.parametrize("friction", [None, FRICTION], ids=["smooth", "rough"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_tool_on_outer_surface(shape, friction):
+    shape, place = SHAPES[shape]
+    gdim = len(place)
+    b = make_blocks(gdim)
+    surface = Surface(b.state.measures.exterior(b.face(gdim - 1, 1.0)))
+    tool = touch(b, shape, place, [surface], friction)
+    asymmetry = assert_slope_two(tool, b.state, smooth(b.state.V, 4, 0.02), 0.05)
+    assert friction is None or asymmetry > 1e-3
+
+
+@pytest.mark.parametrize("depth", [-0.02, 0.02, 0.1], ids=["below", "within", "beyond"])
+def test_blend(depth):
+    """The depth of a plane in the surface, in the three branches of the blended pressure."""
+    b = make_blocks()
+    surface = Surface(b.state.measures.exterior(b.face(1, 1.0)))
+    tool = touch(b, Plane((0.0, -1.0)), (0.5, 1.0 - depth), [surface], FRICTION)
+    u = smooth(b.state.V, 4, 0.002)
+    if depth < 0:
+        assert not Linearised(tool, b.state).forces(u).any()
+    else:
+        assert_slope_two(tool, b.state, u, 0.05)
+
+
+@pytest.mark.parametrize("friction", [None, FRICTION], ids=["smooth", "rough"])
+def test_tool_between_crack_faces(friction):
+    """Each half blade on its face: u('+') and u('−') are not mixed up."""
+    b = make_blocks()
+    crack = b.crack(None)
+    up, right = (0.0, 1.0), (1.0, 0.0)
+    halves = [
+        touch(b, Blade(0.3, 0.05, 0.2, right, up, side=side), (0.95, 0.5), [crack.surface(sign)], friction)
+        for side, sign in ((-1, "+"), (1, "-"))
+    ]
+    b.move(
+        lambda x: np.array([0 * x[0], -0.05 - 0.1 * (1 - x[0])]),
+        lambda x: np.array([0 * x[0], 0.05 + 0.1 * (1 - x[0])]),
+    )
+    u = b.state.u.x.array.copy()
+    for half, sign in zip(halves, (-1, 1), strict=True):
+        assert_slope_two(half, b.state, u, 0.05)
+        pushed = Linearised(half, b.state).forces(u)[1::2].sum()
+        assert -sign * pushed > 0, "the residual of a half blade opposes the force that opens its face"
