@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import pytest
 from dolfinx import mesh
 from mpi4py import MPI
 
@@ -14,8 +13,10 @@ from cutsim.materials import LinearElastic
 from cutsim.solid import Solid
 from cutsim.space import cracked_space
 from cutsim.state import State
+from cutsim.stepping import run
 
 E, NU = 2.0, 0.3
+ELASTIC = LinearElastic(E, NU)
 # φ_n = 1 and φ_t = ½, the set of the path values in the theory
 EXPONENTIAL = Exponential.from_parameters(toughness=1.0, opening=0.1, shear_toughness=0.5, shear_opening=0.2)
 BILINEAR = Bilinear(penalty=200.0, t_n=2.0, G_I=0.2, t_t=3.0, G_II=0.5, eta=1.7)
@@ -37,7 +38,7 @@ class Blocks:
     def crack(self, law=EXPONENTIAL, **options):
         return Crack(self.state, self.facets, self.lower, law, **{"young": E, **options})
 
-    def solid(self, material=LinearElastic(E, NU), **options):
+    def solid(self, material=ELASTIC, **options):
         return Solid(self.state, material, **options)
 
     def drive(self, cells, path, name=None):
@@ -74,10 +75,20 @@ def make_blocks(gdim=2, n=2, comm=MPI.COMM_WORLD, cell=None):
     return Blocks(State(cracked_space(domain, ("Lagrange", 1, (gdim,)), facets)), facets, lower, upper)
 
 
-@pytest.fixture
-def blocks():
-    """Makes two glued blocks."""
-    return make_blocks
+def rotation(gdim, angle):
+    """Rotation matrix, in 3-D about a skew axis (Rodrigues' formula)."""
+    if gdim == 2:
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    a = np.array([1.0, -2.0, 0.5]) / np.linalg.norm([1.0, -2.0, 0.5])
+    W = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+    return np.eye(3) + np.sin(angle) * W + (1 - np.cos(angle)) * W @ W
+
+
+def history(mechanics, until, control):
+    """Run and return the columns of all accepted steps."""
+    rows = []
+    run(mechanics, until, control, lambda r: rows.append({"time": r.time} | {k: v for k, (v, _) in r.columns.items()}))
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def slopes(steps, remainders):

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, E, EXPONENTIAL, NU, make_blocks, slopes
+from conftest import BILINEAR, EXPONENTIAL, NU, E, make_blocks, slopes
 from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_matrix
 
@@ -161,7 +161,7 @@ def test_crack(law, normal, jump):
     crack = b.crack(law, normal=normal, contact=PenaltyContact(30.0))
     crack._kappa.x.array[:] = 0.9 if law is BILINEAR and kappa else kappa * scale
     u = separated(b, sliding * scale, opening * scale, 0.01 * scale)
-    if law is BILINEAR and (opening < 0 and normal == "reference" or opening > 0 and kappa):
+    if law is BILINEAR and ((opening < 0 and normal == "reference") or (opening > 0 and kappa)):
         # on the secant T = (1 − d) K δ, whatever the normal; softening in sliding alone is a straight line
         assert Linearised(crack, b.state).remainders(u, jump_part(b.state, 8, scale), [1e-2])[0] < 1e-9
     else:
