@@ -9,7 +9,6 @@ import numpy as np
 import ufl
 from dolfinx import fem, la
 from dolfinx.common import Timer
-from dolfinx.fem import petsc
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -17,7 +16,8 @@ from petsc4py import PETSc
 from cutsim import compat
 from cutsim.checks import require
 from cutsim.options import Options
-from cutsim.preconditioners import LaggedPC, Preset, create_lagged, fallback_for, preset_for, rigid_body_modes
+from cutsim.preconditioners import LaggedPC, Preset, create_lagged, fallback_for, preset_for
+from cutsim.tangent import Tangent
 
 log = logging.getLogger(__name__)
 
@@ -121,7 +121,7 @@ class NonlinearProblem:
             for form in (F, J)
         )
         self._create_vectors()
-        self._create_matrix()
+        self._tangent = Tangent(self._a, u.function_space, symmetric)
         self._create_snes(rtol)
 
     def _create_vectors(self) -> None:
@@ -133,7 +133,7 @@ class NonlinearProblem:
         self._r, self._g = la.vector(*layout), la.vector(*layout)
         # SNES iterates on a vector of its own: were it that of u, line searches would spoil their own start.
         self._x = la.create_petsc_vector(*layout)
-        self._f, self._diagonal = self._x.duplicate(), self._x.duplicate()
+        self._f = self._x.duplicate()
         self._fixed = np.zeros(self._n, dtype=bool)
         for bc in self.bcs:
             dofs = bc.dof_indices()[0]
@@ -143,18 +143,11 @@ class NonlinearProblem:
         h = np.max(V.mesh.h(V.mesh.topology.dim, cells), initial=0.0)
         self._h = self._comm.allreduce(h, MPI.MAX)
 
-    def _create_matrix(self) -> None:
-        V = self.u.function_space
-        self._A = petsc.create_matrix(self._a)
-        self._A.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
-        if V.dofmap.index_map_bs == V.mesh.geometry.dim > 1:
-            self._A.setNearNullSpace(rigid_body_modes(V))
-
     def _create_snes(self, rtol: float) -> None:
         self._snes = PETSc.SNES().create(self._comm)
         self._snes.setOptionsPrefix(self._options.prefix)
         self._snes.setFunction(self._evaluate_residual, self._f)
-        self._snes.setJacobian(self._evaluate_tangent, self._A)
+        self._snes.setJacobian(self._evaluate_tangent, self._tangent.A)
         self._snes.setConvergenceTest(self._test)
         self._snes.setLineSearchPreCheck(self._check_step)
         # stol = 0: a small step is no sign of equilibrium.
@@ -241,7 +234,7 @@ class NonlinearProblem:
 
     def _better_preconditioner(self) -> bool:
         """After a failed linear solve: rebuild the preconditioner, or else factorise; False if neither is left."""
-        if self._lagged is None or not self._finite_tangent:
+        if self._lagged is None or not self._tangent.finite:
             return False
         was_fresh = self._lagged.fresh
         self._lagged.refresh()
@@ -259,7 +252,7 @@ class NonlinearProblem:
             return "converged"
         if reason == _Reason.DIVERGED_MAX_IT:
             return f"no convergence in {self._max_it} iterations"
-        if reason == _Reason.DIVERGED_LINEAR_SOLVE and not self._finite_tangent:
+        if reason == _Reason.DIVERGED_LINEAR_SOLVE and not self._tangent.finite:
             return _NOT_FINITE
         return _SENTENCES.get(reason, f"PETSc SNES reason {reason}")
 
@@ -311,11 +304,7 @@ class NonlinearProblem:
     def _evaluate_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Called by SNES."""
         self._assign(x)
-        A.zeroEntries()
-        petsc.assemble_matrix(A, self._a, self.bcs)
-        A.assemble()
-        A.getDiagonal(self._diagonal)
-        self._finite_tangent = bool(np.isfinite(self._diagonal.sum()))
+        self._tangent.assemble(self.bcs)
 
     def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:
         """Called by SNES after the linear solve: make the step of the constrained dofs exact."""
@@ -327,7 +316,7 @@ class NonlinearProblem:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Called by SNES: reduce the local numbers, then judge."""
         f, x = snes.getFunction()[0].array_r, snes.getSolution().array_r
-        squares = [f[~self._fixed], self._reaction, self._diagonal.array_r[~self._fixed]]
+        squares = [f[~self._fixed], self._reaction, self._tangent.diagonal[~self._fixed]]
         free, reaction, stiffness = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
         jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self._fixed], x))
         self._size = max(self._size, size)
@@ -351,7 +340,7 @@ class NonlinearProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects and remove the options of this problem."""
-        for thing in (self._snes, self._A, self._x, self._f, self._diagonal):
+        for thing in (self._snes, self._tangent, self._x, self._f):
             thing.destroy()
         self._options.clear()
 
