@@ -17,7 +17,8 @@ class EnergyAudit:
     Attributes:
         external: Work of supports, loads and tools.
         entries: The other side: strain, cohesive_stored, fracture, friction, contact, viscous.
-        scale: Largest turnover so far, the reference of the relative closure.
+        scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with
+            (`cutsim.mechanics` takes the energy that breaks one facet, the least a cracked mesh can resolve).
     """
 
     external: float = 0.0

@@ -22,6 +22,7 @@ from cutsim.cohesive import CohesiveLaw, process_zone_element
 from cutsim.compat import form
 from cutsim.contact import PenaltyContact
 from cutsim.kinematics import Expr, displacement_jump, midsurface_normal, safe_norm
+from cutsim.sizes import facet_size, normal_size
 from cutsim.space import crack_measure_entities
 from cutsim.state import State
 from cutsim.terms import Term
@@ -45,6 +46,11 @@ class Surface:
 
     measure: ufl.Measure
     side: Literal["+", "-"] | None = None
+
+    @classmethod
+    def exterior(cls, state: State, facets: NDArray[np.int32]) -> "Surface":
+        """A part of the outer boundary, given by its local facets."""
+        return cls(state.measures.exterior(facets))
 
     def restrict(self, f: Expr) -> Expr:
         """Restriction of an expression to the side."""
@@ -84,7 +90,8 @@ class Crack(Term):
         submesh: Mesh of the crack's facets.
         facets: Local facet of the parent mesh for each cell of the submesh; the order of all per-facet arrays.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
-        facet_size: Largest and mean size of the facets [length].
+        size: Mean size of the facets along the crack, their shortest edge [length].
+        normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
 
     Raises:
         ValueError: A parameter is outside its range, or the facets are not a crack of the mesh.
@@ -118,10 +125,11 @@ class Crack(Term):
             metadata={"quadrature_degree": 4, "quadrature_scheme": "default"}
         )
         self._make_history(np.asarray(facets, dtype=np.int32))
-        self.facet_size = self._facet_sizes()
-        self.contact = contact or PenaltyContact.automatic(young, self.facet_size[1])
+        self.size = self._mean(facet_size(state.mesh, self.facets))
+        self.normal_size = self._mean(normal_size(state.mesh, self.facets))
+        self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         floor = 3 * law.opening if law is not None else 0.0
-        self._range = closing_range or max(floor, self.facet_size[1])
+        self._range = closing_range or max(floor, self.size)
         self._warn_coarse(young)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
         self._points_form = form(self._point_values(), entity_maps=self.entity_maps)
@@ -132,6 +140,11 @@ class Crack(Term):
     def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
         """Map from facets of the mesh to cells of the crack's submesh."""
         return {self.submesh: self._facet_to_cell}
+
+    @property
+    def facet_energy(self) -> float:
+        """Energy that breaks a facet of mean size in opening; 0 without a law."""
+        return self.law.toughness[0] * self._mean(self.weights.sum(axis=1)) if self.law is not None else 0.0
 
     def surface(self, side: Literal["+", "-"]) -> Surface:
         """One face of the crack, for tool contact."""
@@ -287,8 +300,8 @@ class Crack(Term):
         return f"{self.name}: largest opening {opening:.3g}, largest penetration {max(penetration, 0.0):.3g}"
 
     def record(self) -> dict[str, tuple[float, str]]:
-        """Broken area ∫ D dΓ₀, largest opening, largest penetration as a fraction of the facet size. Collective."""
-        penetration = max(self._max(-self._trial["opening"]), 0.0) / self.facet_size[1]
+        """Broken area ∫ D dΓ₀, largest opening, largest penetration (a fraction of the normal mesh size). Collective."""
+        penetration = max(self._max(-self._trial["opening"]), 0.0) / self.normal_size
         columns = {
             f"{self.name}_opening": (self._max(self._trial["opening"]), "length"),
             f"{self.name}_penetration": (penetration, "one"),
@@ -316,22 +329,17 @@ class Crack(Term):
         """Mean over each local crack facet of a point quantity; arguments as `point_values`."""
         return (self.point_values(name) * self.weights).sum(axis=1) / self.weights.sum(axis=1)
 
-    def _facet_sizes(self) -> tuple[float, float]:
-        """Largest and mean facet size: the length, or the root of the area of a square [length]."""
-        area = self.weights[: self._owned].sum(axis=1)
-        if self.submesh.topology.dim == 2:
-            area = np.sqrt(area * (2 if self.submesh.topology.cell_name() == "triangle" else 1))
-        comm = self.state.mesh.comm
-        count = comm.allreduce(len(area), op=MPI.SUM)
-        largest = comm.allreduce(float(area.max(initial=0.0)), op=MPI.MAX)
-        return largest, comm.allreduce(float(area.sum()), op=MPI.SUM) / count
+    def _mean(self, per_facet: NDArray[np.float64]) -> float:
+        total = np.array([per_facet[: self._owned].sum(), self._owned])
+        total = self.state.mesh.comm.allreduce(total, op=MPI.SUM)
+        return float(total[0] / total[1])
 
     def _warn_coarse(self, young: float) -> None:
         if self.law is None:
             return
         allowed = process_zone_element(self.law, young)
-        if self.facet_size[1] > allowed:
+        if self.size > allowed:
             logger.warning(
                 "%s: facets of %.3g do not resolve the process zone (opening %.3g): use %.3g or less",
-                self.name, self.facet_size[1], self.law.opening, allowed,
+                self.name, self.size, self.law.opening, allowed,
             )  # fmt: skip

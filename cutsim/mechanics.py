@@ -65,7 +65,7 @@ class Mechanics:
             petsc_options_prefix=petsc_options_prefix,
             rtol=rtol,
         )
-        self.audit = self._trial_audit = EnergyAudit()
+        self.audit = self._trial_audit = EnergyAudit(scale=max((c.facet_energy for c in cracks), default=0.0))
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
         self._residual_old: NDArray[np.float64] = self._residual
 

@@ -103,6 +103,23 @@ class Blade:
         flank = ((height - self.tip_radius) * sin(self.half_angle) + self.tip_radius) / cos(self.half_angle)
         return min(flank, self.half_thickness)
 
+    def outline(self, height: float, points: int = 12) -> NDArray[np.float64]:
+        """Cross-section of the whole blade up to a height above the tip, for pictures.
+
+        Args:
+            height: Height above the tip [length].
+            points: Points on the arc of the tip, on each side.
+
+        Returns:
+            Closed polygon without repeated point, rows (lateral, above the tip) [length].
+        """
+        turn = np.linspace(0, pi / 2 - self.half_angle, points)
+        arc = self.tip_radius * np.column_stack([np.sin(turn), 1 - np.cos(turn)])
+        flank = self.flank_height + self.tip_radius
+        rest = [(self.half_width(h), h) for h in sorted({min(flank, height), height})]
+        right = np.vstack([arc, rest])
+        return np.vstack([right, (right * (-1, 1))[:0:-1]])
+
     def distance(self, x: Expr) -> Expr:
         """Distance to the sharp core (a convex polygon) minus the tip radius [length]."""
         r, width, height = self.tip_radius, self.half_thickness - self.tip_radius, self.flank_height

@@ -196,10 +196,10 @@ def test_closing_fades_on_wide_open_faces():
     b = make_blocks()
     crack = b.crack(None, contact=PENALTY)
     forces = Forces(b.state, [crack])
-    near = 1e-3 * crack.facet_size[1]
+    near = 1e-3 * crack.size
     b.move(lambda x: 0 * x, lambda x: np.array([0 * x[0], 0 * x[0] - near]))
     assert np.abs(forces()).sum() == pytest.approx(2 * PENALTY.stiffness * near, rel=1e-6)
-    b.move(lambda x: 0 * x, lambda x: np.array([0 * x[0], 0 * x[0] - 4 * crack.facet_size[1]]))
+    b.move(lambda x: 0 * x, lambda x: np.array([0 * x[0], 0 * x[0] - 4 * crack.size]))
     assert np.abs(forces()).max() < 1e-12
 
 
@@ -211,7 +211,7 @@ def test_pressure_is_the_penalty_times_the_penetration(blend):
     quadratic = penetration < 2 * blend
     pressure = 500 * np.where(quadratic, penetration**2 / (4 * blend or 1), penetration - blend)
     np.testing.assert_allclose(-rows["upper_y_force"], pressure, rtol=1e-9)
-    np.testing.assert_allclose(rows["crack_penetration"], penetration / crack.facet_size[1], rtol=1e-9)
+    np.testing.assert_allclose(rows["crack_penetration"], penetration / crack.normal_size, rtol=1e-9)
     assert rows["energy_contact"][-1] == pytest.approx(500 * ((0.01 - blend) ** 2 / 2 + blend**2 / 6), rel=1e-4)
 
 

@@ -1,0 +1,191 @@
+"""The blade cut as one ready-made problem: a notched block, a crack plane, a blade in two halves, a plate."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, Self
+
+import numpy as np
+from dolfinx.mesh import locate_entities_boundary
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from cutsim.checks import require
+from cutsim.cohesive import CohesiveLaw
+from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.interface import Crack, Surface
+from cutsim.loads import Support
+from cutsim.materials import Material
+from cutsim.mechanics import Mechanics
+from cutsim.meshing import TaggedMesh
+from cutsim.recording import Columns
+from cutsim.solid import Solid
+from cutsim.space import cracked_space
+from cutsim.state import State
+from cutsim.tool_contact import ToolContact, warn_coarse
+from cutsim.tools import Blade, Path
+
+# measured on blade cuts: stiff enough for the force, soft enough for Newton's method (pressure per length over E)
+_PENALTY = 5.0
+_BLEND = 0.4
+_TIP_IN_NOTCH = 0.8
+
+
+@dataclass(frozen=True)
+class BladeCut:
+    """A blade driven into a block along a predefined crack plane.
+
+    The plane of the crack is x = 0, the blade moves along −y from the top at y = 0, and its edge lies along z.
+    The block rests on a smooth plate, where it is also held across the crack plane along the last line of the crack.
+    Time is the way of the tool: the insertion takes `insertion`, the push has unit speed.
+
+    Attributes:
+        domain: The tagged mesh.
+        state: Displacement and time.
+        mechanics: The problem to run.
+        solid: The block.
+        crack: The crack ahead of the notch.
+        halves: The half blades on the side of +x and −x.
+        plate: Support under the block.
+        blade: The whole blade.
+        insertion: Duration of the insertion [time].
+        tip: Depth of the tip when the push begins [length].
+        whole: Factor from the meshed part to the whole block.
+    """
+
+    domain: TaggedMesh
+    state: State
+    mechanics: Mechanics
+    solid: Solid
+    crack: Crack
+    halves: tuple[ToolContact, ToolContact]
+    plate: Support
+    blade: Blade
+    insertion: float
+    tip: float
+    whole: float
+
+    @classmethod
+    def build(
+        cls,
+        domain: TaggedMesh,
+        material: Material,
+        law: CohesiveLaw,
+        blade: Blade,
+        *,
+        notch: float,
+        friction: float = 0.0,
+        viscosity: float = 0.0,
+        insertion: float = 1.0,
+    ) -> Self:
+        """Put the problem together and compile its forms. Collective.
+
+        Args:
+            domain: Mesh with cells "left", "right" and facets "crack", "notch", "top_left", "top_right", "bottom", and
+                "symmetry" if only the half z > 0 of the block is meshed (see meshes/block.geo).
+            material: Material of the block.
+            law: Cohesive law of the crack.
+            blade: The whole blade (side 0).
+            notch: Depth of the notch in which the blade is inserted [length].
+            friction: Friction coefficient of blade and block [–].
+            viscosity: Kelvin–Voigt viscosity of the block [stress·time].
+            insertion: Time in which the half blades are spread apart in the notch [time].
+
+        Raises:
+            ValueError: A parameter is outside its range or the mesh lacks a group.
+        """
+        require("notch", notch, notch > blade.tip_radius, f"> the blade's tip radius {blade.tip_radius}")
+        require("friction", friction, friction >= 0, ">= 0")
+        require("insertion", insertion, insertion > 0, "> 0")
+        mesh = domain.mesh
+        state = State(cracked_space(mesh, ("Lagrange", 1, (mesh.geometry.dim,)), _slit(domain)))
+        solid = Solid(state, material, name="block", viscosity=viscosity)
+        plus = domain.cells("right")
+        crack = Crack(state, domain.facets("crack"), plus, law, young=material.young)
+        mouth = Crack(state, domain.facets("notch"), plus, None, young=material.young, name="notch")
+        warn_coarse("blade", blade, crack.size)
+        tip = _TIP_IN_NOTCH * notch
+        contact = PenaltyContact.automatic(material.young, crack.normal_size, _PENALTY, blend=_BLEND * blade.tip_radius)
+        coulomb = Coulomb(friction, 1e-3 * crack.size) if friction else None
+
+        def half(side: int, face: Literal["+", "-"], name: str) -> ToolContact:
+            top = Surface.exterior(state, domain.facets(f"top_{name}"))
+            return ToolContact(
+                state,
+                replace(blade, side=side),
+                _path(blade, side, tip, insertion, mesh.geometry.dim),
+                [top, crack.surface(face), mouth.surface(face)],
+                contact=contact,
+                friction=coulomb,
+                name=f"blade_{name}",
+            )
+
+        halves = half(1, "+", "right"), half(-1, "-", "left")
+        plate, supports = _supports(domain, state)
+        mechanics = Mechanics(state, [solid, crack, mouth, *halves], [plate, *supports])
+        whole = 2.0 if "symmetry" in domain.names else 1.0
+        return cls(domain, state, mechanics, solid, crack, halves, plate, blade, insertion, tip, whole)
+
+    def time_of(self, depth: float) -> float:
+        """Time at which the tip is this deep below the top [time]."""
+        require("depth", depth, depth >= self.tip, f">= {self.tip}, where the push begins")
+        return self.insertion + depth - self.tip
+
+    def columns(self, columns: Columns) -> Columns:
+        """Depth of the tip, force of the whole blade, its imbalance with the plate. Collective."""
+        force = self.whole * sum(half.force()[1] for half in self.halves)
+        reaction = self.whole * self.mechanics.reaction(self.plate)
+        depth = -float(self.halves[0].position.value[1])
+        imbalance = abs(reaction - force) / abs(force) if force else 0.0
+        return {"depth": (depth, "length"), "force": (force, "force"), "imbalance": (imbalance, "one")}
+
+
+def recovered_toughness(history: Mapping[str, NDArray[np.float64]], start: float, end: float) -> float:
+    """Toughness from a simulated curve by a balance of work, G = (∫F ds − ΔE − losses)/ΔA [force/length].
+
+    What the tool spends between two depths is not taken from the cohesive law: it is the external work less the elastic
+    energy of body, bond and contact, and less friction and viscous losses; ΔA is the growth of the broken area.
+
+    Args:
+        history: Columns of a run of `BladeCut`.
+        start: Depth at which the balance begins [length].
+        end: Depth at which it ends [length].
+
+    Raises:
+        ValueError: The crack does not grow between the two depths.
+    """
+    held = ("strain", "cohesive_stored", "contact", "friction", "viscous")
+    spent = history["work_external"] - sum(history[f"energy_{name}"] for name in held)
+    depth = history["depth"]
+
+    def grown(column: NDArray[np.float64]) -> float:
+        pushed = np.flatnonzero(np.diff(depth, prepend=-np.inf) > 0)
+        first, last = np.interp([start, end], depth[pushed], column[pushed])
+        return float(last - first)
+
+    area = grown(history["crack_broken"])
+    require("depths", (start, end), area > 0, "such that the crack grows between them")
+    return grown(spent) / area
+
+
+def _slit(domain: TaggedMesh) -> list[NDArray[np.int32]]:
+    return [domain.facets("crack"), domain.facets("notch")]
+
+
+def _path(blade: Blade, side: int, tip: float, insertion: float, gdim: int) -> Path:
+    """Retracted beside the plane of symmetry, spread inside the notch, then pushed at unit speed without end."""
+    away = -side * blade.half_width(tip)
+    push = 1e3
+    rows = [(away, -tip, 0.0), (0.0, -tip, 0.0), (0.0, -tip - push, 0.0)]
+    return Path.polyline([0.0, insertion, insertion + push], [row[:gdim] for row in rows])
+
+
+def _supports(domain: TaggedMesh, state: State) -> tuple[Support, list[Support]]:
+    """The plate; the line that stops the block from sliding across it; the symmetry plane."""
+    mesh = state.mesh
+    bottom = mesh.comm.allreduce(float(mesh.geometry.x[:, 1].min(initial=np.inf)), op=MPI.MIN)
+    line = locate_entities_boundary(mesh, 0, lambda x: np.isclose(x[0], 0.0) & np.isclose(x[1], bottom))
+    plate = Support(state, domain.facets("bottom"), 1, name="plate")
+    others = [Support(state, line, 0, dim=0)]
+    if "symmetry" in domain.names:
+        others.append(Support(state, domain.facets("symmetry"), 2))
+    return plate, others
