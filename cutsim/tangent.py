@@ -33,7 +33,8 @@ class Tangent:
             self._csr = fem.create_matrix(a, block_mode=la.BlockMode.expanded)
             n = len(self._csr.indptr) - 1
             arrays = self._csr.indptr.astype(PETSc.IntType), self._csr.indices, self._csr.data
-            self.A = PETSc.Mat().createAIJWithArrays((n, n), arrays, bsize=bs, comm=V.mesh.comm)
+            self.A = PETSc.Mat().createAIJWithArrays((n, n), arrays, comm=V.mesh.comm)
+            self.A.setBlockSize(bs)
         else:
             self._csr = None
             self.A = petsc.create_matrix(a)
