@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 #: Unknowns up to which a factorisation is the fastest, by dimension of space.
-DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 15_000}
+DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 10_000}
 #: Unknowns up to which a factorisation is worth trying when everything else failed.
 FALLBACK_LIMIT = 200_000
 

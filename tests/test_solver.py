@@ -282,10 +282,10 @@ def test_an_unknown_line_search_is_refused():
 @pytest.mark.parametrize(
     ("n_dofs", "ranks", "has_interface", "gdim", "name", "smoother"),
     [
-        (15_000, 1, False, 3, "direct", None),
-        (15_000, 3, True, 3, "direct", None),
+        (10_000, 1, False, 3, "direct", None),
+        (10_000, 3, True, 3, "direct", None),
         (60_000, 1, True, 2, "direct", None),
-        (100_000, 1, False, 3, "bulk", "richardson"),
+        (10_001, 1, False, 3, "bulk", "richardson"),
         (100_000, 2, False, 3, "bulk", "chebyshev"),
         (100_000, 1, True, 3, "crack", "richardson"),
         (500_000, 2, True, 2, "crack", "chebyshev"),
