@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain, count
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,9 @@ from cutsim.terms import Term
 #: Uzawa augmentations allowed in one step.
 AUGMENTATIONS = 30
 
+# problems that live in one process must not share PETSc options
+_prefixes = chain(["cut_"], (f"cut{n}_" for n in count(2)))
+
 
 class Mechanics:
     """Quasi-static equilibrium of solids, cracks, tools and loads.
@@ -30,7 +34,8 @@ class Mechanics:
         terms: Terms of the virtual work.
         supports: Prescribed displacements.
         petsc_options: PETSc options without prefix; they win over the presets.
-        petsc_options_prefix: Prefix of all PETSc options of the problem.
+        petsc_options_prefix: Prefix of all PETSc options of the problem, no other's; by default "cut_" for the first
+            problem of a process, then "cut2_" and so on.
         rtol: Residual tolerance relative to the reactions.
 
     Raises:
@@ -44,7 +49,7 @@ class Mechanics:
         supports: Sequence[Support] = (),
         *,
         petsc_options: Mapping[str, Any] | None = None,
-        petsc_options_prefix: str = "cut_",
+        petsc_options_prefix: str | None = None,
         rtol: float = 1e-8,
     ) -> None:
         names = [t.name for t in terms] + [s.name for s in supports if s.name]
@@ -62,7 +67,7 @@ class Mechanics:
             symmetric=all(t.symmetric for t in terms),
             interface_dofs=self._interface_nodes(cracks) if cracks else None,
             petsc_options=petsc_options,
-            petsc_options_prefix=petsc_options_prefix,
+            petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
             rtol=rtol,
         )
         self.audit = self._trial_audit = EnergyAudit(scale=max((c.facet_energy for c in cracks), default=0.0))

@@ -100,14 +100,16 @@ KINDS = [(3, "strain"), (2, "strain"), (2, "stress")]
 )
 def test_hyperelastic(material, gdim, plane):
     b = make_blocks(gdim)
-    solid = b.solid(material, plane=plane)
-    assert_slope_two(solid, b.state, smooth(b.state.V, 1, 0.2), 1.0)
+    for volumetric in ("full", "reduced"):
+        solid = b.solid(material, plane=plane, volumetric=volumetric)
+        assert_slope_two(solid, b.state, smooth(b.state.V, 1, 0.2), 1.0)
 
 
+@pytest.mark.parametrize("volumetric", ["full", "reduced"])
 @pytest.mark.parametrize(("gdim", "plane"), KINDS, ids=["3-D", "plane strain", "plane stress"])
-def test_linear_elastic_has_no_remainder(gdim, plane):
+def test_linear_elastic_has_no_remainder(gdim, plane, volumetric):
     b = make_blocks(gdim)
-    solid = b.solid(LinearElastic(E, NU), plane=plane)
+    solid = b.solid(LinearElastic(E, NU), plane=plane, volumetric=volumetric)
     problem = Linearised(solid, b.state)
     u, w = smooth(b.state.V, 1, 0.2), smooth(b.state.V, 2, 1.0)
     assert problem.remainders(u, w, [1.0])[0] < 1e-13

@@ -1,0 +1,199 @@
+"""Strain energies at homogeneous deformations, evaluated symbolically, and the finite-element body in closed forms."""
+
+import numpy as np
+import pytest
+import ufl
+from conftest import NU, E, history, make_blocks, rotation
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+from cutsim.assembly import integrate
+from cutsim.compat import form
+from cutsim.loads import Support, Traction
+from cutsim.materials import LinearElastic, MooneyRivlin, NeoHookean, StVenantKirchhoff
+from cutsim.mechanics import Mechanics
+from cutsim.solid import Solid
+from cutsim.state import State
+from cutsim.stepping import StepControl
+
+MOONEY = MooneyRivlin(0.3, 0.1, 4.0)
+MATERIALS = [NeoHookean(E, NU), StVenantKirchhoff(E, NU), LinearElastic(E, NU), MOONEY]
+each = pytest.mark.parametrize("material", MATERIALS, ids=lambda m: type(m).__name__)
+F0 = np.array([[1.2, 0.3, -0.1], [0.05, 0.9, 0.2], [0.1, -0.15, 1.1]])
+
+
+def number(expression):
+    """Value of a UFL expression without coefficients."""
+    expression = ufl.as_ufl(expression)
+    shape = expression.ufl_shape
+    return np.array([expression((), component=i) for i in np.ndindex(*shape)]).reshape(shape)
+
+
+def energy(material, F):
+    return number(sum(material.energy(ufl.as_matrix(F.tolist()))))
+
+
+def stress(material, F):
+    """First Piola–Kirchhoff stress."""
+    variable = ufl.variable(ufl.as_matrix(F.tolist()))
+    return number(ufl.diff(sum(material.energy(variable)), variable))
+
+
+@each
+def test_reference_is_free_of_energy_and_stress(material):
+    assert energy(material, np.eye(3)) == pytest.approx(0, abs=1e-14)
+    np.testing.assert_allclose(stress(material, np.eye(3)), 0, atol=1e-14)
+
+
+@each
+def test_small_strains_follow_hooke(material):
+    """P = 2 G ε + λ tr ε I with the constants that the material reports."""
+    H = 1e-6 * (F0 - np.eye(3))
+    strain = 0.5 * (H + H.T)
+    young, poisson = material.young, material.poisson
+    hooke = young / (1 + poisson) * (strain + poisson / (1 - 2 * poisson) * np.trace(strain) * np.eye(3))
+    np.testing.assert_allclose(stress(material, np.eye(3) + H), hooke, atol=1e-5 * np.abs(hooke).max())
+
+
+@pytest.mark.parametrize("material", [m for m in MATERIALS if not isinstance(m, LinearElastic)], ids=repr)
+@pytest.mark.parametrize("angle", [0.3, 2.0])
+def test_energy_is_objective(material, angle):
+    assert energy(material, rotation(3, angle) @ F0) == pytest.approx(float(energy(material, F0)), rel=1e-13)
+    assert energy(material, F0 @ rotation(3, angle)) == pytest.approx(float(energy(material, F0)), rel=1e-13)
+
+
+@pytest.mark.parametrize("kind", [NeoHookean, StVenantKirchhoff, LinearElastic])
+def test_moduli_are_those_of_young_and_poisson(kind):
+    material = kind.from_moduli(shear=0.7, bulk=3.0)
+    assert (material.shear, material.bulk) == (pytest.approx(0.7), pytest.approx(3.0))
+    again = kind(material.young, material.poisson)
+    assert again.lame == pytest.approx(3.0 - 2 * 0.7 / 3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "name"),
+    [
+        (NeoHookean, (0.0, 0.3), "young"),
+        (NeoHookean, (1.0, 0.5), "poisson"),
+        (StVenantKirchhoff, (1.0, -1.0), "poisson"),
+        (MooneyRivlin, (0.0, 0.1, 1.0), "c1"),
+        (MooneyRivlin, (0.1, -0.1, 1.0), "c2"),
+        (MooneyRivlin, (0.1, 0.1, 0.0), "bulk"),
+        (NeoHookean.from_moduli, (0.0, 1.0), "shear"),
+        (NeoHookean.from_moduli, (1.0, -1.0), "bulk"),
+    ],
+)
+def test_refuses_what_has_no_meaning(kind, values, name):
+    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+        kind(*values)
+
+
+@pytest.mark.parametrize("material", MATERIALS[:3], ids=lambda m: type(m).__name__)
+@pytest.mark.parametrize("plane", [[[1.3, 0.2], [0.1, 0.8]], [[0.8, 0.0], [0.0, 0.7]], [[1.5, 0.0], [0.3, 1.4]]])
+def test_plane_stress_is_free_of_stress_out_of_plane(material, plane):
+    F = np.eye(3)
+    F[:2, :2] = plane
+    F[2, 2] = number(material.plane_stress_stretch(ufl.as_matrix(F.tolist())))
+    assert abs(stress(material, F)[2, 2]) < 1e-12 * E
+
+
+def test_plane_stress_of_mooney_rivlin_is_refused():
+    with pytest.raises(ValueError, match="plane = 'stress'"):
+        make_blocks().solid(MOONEY, plane="stress")
+
+
+# -- the finite-element body ------------------------------------------------------------------------------------------
+
+
+def cube_between_plates(material, stretch, lateral):
+    """Unit cube stretched along z (and x); its other faces free, or with symmetry only."""
+    domain = mesh.create_unit_cube(MPI.COMM_WORLD, 1, 1, 1, mesh.CellType.hexahedron)
+    state = State(fem.functionspace(domain, ("Lagrange", 1, (3,))))
+
+    def face(axis, at):
+        return mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[axis], at))
+
+    supports = [Support(state, face(i, 0.0), i) for i in range(3)]
+    supports.append(Support(state, face(2, 1.0), 2, lambda t: (stretch - 1) * t, name="top"))
+    if lateral:
+        supports.append(Support(state, face(0, 1.0), 0, lambda t: (stretch - 1) * t, name="side"))
+    return Mechanics(state, [Solid(state, material)], supports)
+
+
+@pytest.mark.parametrize("stretch", [0.6, 1.5, 2.0])
+@pytest.mark.parametrize(("lateral", "power"), [(False, -2), (True, -5)], ids=["uniaxial", "equibiaxial"])
+def test_nearly_incompressible_neo_hookean(stretch, lateral, power):
+    """P = G (λ − λ⁻²) and G (λ − λ⁻⁵), up to the compressibility of order G/K."""
+    material = NeoHookean.from_moduli(shear=0.5, bulk=2.5e5)
+    rows = history(cube_between_plates(material, stretch, lateral), 1.0, StepControl.fixed(0.1))
+    assert rows["top_force"][-1] == pytest.approx(0.5 * (stretch - stretch**power), rel=1e-4)
+
+
+@pytest.mark.parametrize("plane", ["strain", "stress"])
+def test_plane_stiffness_is_that_of_hooke(plane):
+    """A strip under dead traction: E for plane stress, E/(1 − ν²) for plane strain, W = ½ P u."""
+    b = make_blocks()
+    whole = State(fem.functionspace(b.state.mesh, ("Lagrange", 1, (2,))))
+    supports = [Support(whole, b.face(i, 0.0), i) for i in range(2)]
+    load = Traction(whole, b.face(1, 1.0), (0.0, 1e-3), lambda t: t)
+    rows = history(
+        Mechanics(whole, [Solid(whole, LinearElastic(E, NU), plane=plane), load], supports), 1.0, StepControl.fixed(1.0)
+    )
+    modulus = E if plane == "stress" else E / (1 - NU**2)
+    assert whole.u.x.array[1::2].max() == pytest.approx(1e-3 / modulus, rel=1e-9)
+    assert rows["energy_strain"][-1] == pytest.approx(0.5e-6 / modulus, rel=1e-9)
+    assert rows["load_force_y"][-1] == pytest.approx(1e-3)
+
+
+def bending_deflection(volumetric, poisson):
+    """Tip deflection of a short cantilever of quadrilaterals under an end shear."""
+    domain = mesh.create_rectangle(MPI.COMM_WORLD, [(0.0, 0.0), (4.0, 1.0)], (16, 4), mesh.CellType.quadrilateral)
+    state = State(fem.functionspace(domain, ("Lagrange", 1, (2,))))
+    ends = [mesh.locate_entities_boundary(domain, 1, lambda x, at=at: np.isclose(x[0], at)) for at in (0.0, 4.0)]
+    solid = Solid(state, LinearElastic(1.0, poisson), volumetric=volumetric)
+    load = Traction(state, ends[1], (0.0, 1e-4), lambda t: t)
+    mechanics = Mechanics(state, [solid, load], [Support(state, ends[0], i) for i in range(2)])
+    history(mechanics, 1.0, StepControl.fixed(1.0))
+    return state.u.x.array[1::2].max()
+
+
+def test_reduced_integration_relieves_locking():
+    """Timoshenko's beam in plane strain; with full integration the tip hardly moves as ν → ½."""
+    poisson, P, L = 0.4999, 1e-4, 4.0
+    beam = 4 * P * L**3 * (1 - poisson**2) + P * L * 2 * (1 + poisson) * 6 / 5
+    assert bending_deflection("reduced", poisson) == pytest.approx(beam, rel=0.05)
+    assert bending_deflection("auto", poisson) == bending_deflection("reduced", poisson)
+    assert bending_deflection("full", poisson) < 0.5 * beam
+
+
+def test_stress_and_energy_density_of_a_homogeneous_body():
+    b = make_blocks(3)
+    material = NeoHookean(E, NU)
+    solid = b.solid(material)
+    b.move(*[lambda x: (F0 - np.eye(3)) @ x] * 2)
+    P, J = stress(material, F0), np.linalg.det(F0)
+    sigma = solid.cauchy_stress(b.state.u)
+    values = [[integrate(form(sigma[i, j] * ufl.dx)) for j in range(3)] for i in range(3)]
+    np.testing.assert_allclose(values, P @ F0.T / J, rtol=1e-10)
+    assert integrate(form(solid.strain_energy_density(b.state.u) * ufl.dx)) == pytest.approx(
+        float(energy(material, F0))
+    )
+    assert solid.energies()["strain"] == pytest.approx(float(energy(material, F0)))
+    assert solid.smallest_jacobian() == pytest.approx(J)
+
+
+def test_an_inverted_element_is_named():
+    b = make_blocks()
+    solid = b.solid(NeoHookean(E, NU), name="gel")
+    assert solid.diagnose() is None
+    b.move(lambda x: 0 * x, lambda x: np.array([-2.5 * x[0], 0 * x[0]]))
+    assert "gel: element inverted, smallest J = -1.5" in solid.diagnose()
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [({"plane": "stress"}, "plane"), ({"volumetric": "none"}, "volumetric"), ({"viscosity": -1.0}, "viscosity")],
+)
+def test_body_refuses_bad_parameters(options, name):
+    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+        make_blocks(3).solid(**options)
