@@ -1,0 +1,212 @@
+"""Signed distances of tools against distances to points sampled on their outlines, and paths."""
+
+from itertools import pairwise
+
+import basix.ufl
+import numpy as np
+import pytest
+import ufl
+
+from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
+
+HALF, R, SHANK = 0.4, 0.3, 0.9  # half angle, tip radius, half thickness of the blade
+BLADE = Blade(HALF, R, SHANK)
+
+
+def values(shape, points):
+    """Distances and gradients at points, shape (n, dimension)."""
+    n = len(points[0])
+    cell = {2: "triangle", 3: "tetrahedron"}[n]
+    x = ufl.variable(ufl.SpatialCoordinate(ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(n,)))))
+    distance = shape.distance(x)
+    gradient = ufl.algorithms.expand_derivatives(ufl.diff(distance, x))
+    distance = ufl.algorithms.expand_derivatives(distance)
+    return (
+        np.array([distance(tuple(p)) for p in points]),
+        np.array([[gradient(tuple(p), component=(i,)) for i in range(n)] for p in points]),
+    )
+
+
+def dense(corners, n=4000):
+    """Points on a polygonal chain."""
+    return np.concatenate([np.linspace(a, b, n) for a, b in pairwise(np.asarray(corners, dtype=float))])
+
+
+def arc(centre, radius, start, end, n=4000):
+    t = np.linspace(start, end, n)
+    return np.asarray(centre) + radius * np.stack([np.cos(t), np.sin(t)], axis=1)
+
+
+def right_outline():
+    """Right half of the blade's outline, foremost point at the origin, cutting downwards."""
+    centre, joint = np.array([0, R]), np.array([SHANK - R, R + (SHANK - R) / np.tan(HALF)])
+    normal = R * np.array([np.cos(HALF), -np.sin(HALF)])
+    return np.concatenate(
+        [
+            arc(centre, R, -np.pi / 2, -HALF),
+            dense([centre + normal, joint + normal]),
+            arc(joint, R, -HALF, 0),
+            dense([joint + [R, 0], joint + [R, 20]]),
+        ]
+    )
+
+
+def blade_outlines():
+    right = right_outline()
+    left = (right * [-1, 1])[::-1]
+    beyond = dense([(-20, 0), (0, 0)])  # a half blade goes on without end on the other side
+    return {
+        0: np.concatenate([left, right]),
+        1: np.concatenate([beyond, right]),
+        -1: np.concatenate([left, -beyond[::-1]]),
+    }
+
+
+def punch_outline():
+    right = [dense([(0, 0), (0.5, 0)]), arc((0.5, 0.2), 0.2, -np.pi / 2, 0), dense([(0.7, 0.2), (0.7, 20)])]
+    right = np.concatenate(right)
+    return np.concatenate([(right * [-1, 1])[::-1], right])
+
+
+OUTLINES = {
+    "blade": (BLADE, blade_outlines()[0], (0.0, 2.0)),
+    "right half": (Blade(HALF, R, SHANK, side=1), blade_outlines()[1], (0.0, 2.0)),
+    "left half": (Blade(HALF, R, SHANK, side=-1), blade_outlines()[-1], (0.0, 2.0)),
+    "cylinder": (Ball(0.8), arc((0, 0), 0.8, 0, 2 * np.pi), (0.0, 0.0)),
+    "punch": (FlatPunch(0.7, 0.2), punch_outline(), (0.0, 2.0)),
+}
+each = pytest.mark.parametrize("name", OUTLINES)
+
+
+def distance_to_chain(chain, p):
+    """Distance of a point to a chain of segments."""
+    a, d = chain[:-1], np.diff(chain, axis=0)
+    t = np.clip(((p - a) * d).sum(axis=1) / np.maximum((d**2).sum(axis=1), 1e-300), 0, 1)
+    return np.linalg.norm(a + t[:, None] * d - p, axis=1).min()
+
+
+def near(outline, seed=0, n=60):
+    """Points up to 0.25 from the outline on either side, clear of its ends."""
+    rng = np.random.default_rng(seed)
+    on = outline[(np.abs(outline) < 4).all(axis=1)]
+    return on[rng.integers(len(on), size=n)] + rng.uniform(-0.25, 0.25, (n, 2)) / np.sqrt(2)
+
+
+@each
+def test_distance_is_that_to_the_nearest_point_of_the_surface(name):
+    shape, outline, inside = OUTLINES[name]
+    points = near(outline)
+    brute = [distance_to_chain(outline, p) for p in points]
+    distance, gradient = values(shape, points)
+    # inside, the distance is exact where a contact may come: less than the smallest radius deep
+    np.testing.assert_allclose(np.abs(distance), brute, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(gradient, axis=1), 1, atol=1e-10)
+    assert values(shape, [inside])[0] < 0
+    assert (distance < 0).any() and (distance > 0).any()
+
+
+@each
+def test_distance_and_gradient_are_continuous(name):
+    """Across the borders of tip, flank, joint and shank: nowhere a jump on a fine walk along the surface."""
+    shape, outline, _ = OUTLINES[name]
+    walk = outline[(np.abs(outline) < 3).all(axis=1)]
+    for shift in (0.0, 0.05):
+        points = walk[::100] + [0, shift]
+        distance, gradient = values(shape, points)
+        step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        together = step < 0.5
+        assert (np.abs(np.diff(distance)) <= step + 1e-9)[together].all()
+        turn = np.linalg.norm(np.diff(gradient, axis=0), axis=1)
+        assert (turn <= step / (0.2 * 0.5) + 1e-6)[together].all()
+
+
+@pytest.mark.parametrize(
+    ("shape", "exact"),
+    [
+        (Ball(0.8), lambda x: np.linalg.norm(x) - 0.8),
+        (Ball(0.8, (0, 2.0, 0)), lambda x: np.hypot(x[0], x[2]) - 0.8),
+        (Plane((0, 0, -2.0)), lambda x: -x[2]),
+    ],
+    ids=["sphere", "cylinder", "plane"],
+)
+def test_shapes_in_three_dimensions(shape, exact):
+    points = np.random.default_rng(1).uniform(-1.5, 1.5, (50, 3))
+    distance, gradient = values(shape, points)
+    np.testing.assert_allclose(distance, [exact(p) for p in points], atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(gradient, axis=1), 1, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["blade", "punch"])
+def test_three_dimensional_shape_is_the_plane_one_swept(kind):
+    """A blade is the same all along its edge, a punch all round its axis; both in any orientation."""
+    rng = np.random.default_rng(3)
+    push, lateral = np.array([0.0, 0.6, -0.8]), np.array([1.0, 0.0, 0.0])
+    third = np.cross(push, lateral)
+    flat = rng.uniform(-1, 1.5, (60, 2))
+    along = rng.uniform(-1, 1, 60)
+    if kind == "blade":
+        solid, plane = Blade(HALF, R, SHANK, tuple(push), tuple(lateral)), BLADE
+        points = flat[:, :1] * lateral - flat[:, 1:] * push + along[:, None] * third
+    else:
+        solid, plane = FlatPunch(0.7, 0.2, tuple(push)), FlatPunch(0.7, 0.2)
+        radial = np.cos(along)[:, None] * lateral + np.sin(along)[:, None] * third
+        points = flat[:, :1] * radial - flat[:, 1:] * push
+    np.testing.assert_allclose(values(solid, points)[0], values(plane, flat)[0], atol=1e-9)
+
+
+def test_half_width_is_the_outline():
+    """On the flank, and on the shank above the rounded joint."""
+    for height in (0.5, 1.0, 3.0):
+        assert abs(values(BLADE, [(BLADE.half_width(height), height)])[0][0]) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments", "name"),
+    [
+        (Blade, (0.0, 0.1, 1.0), "half_angle"),
+        (Blade, (np.pi / 2, 0.1, 1.0), "half_angle"),
+        (Blade, (0.2, 0.0, 1.0), "tip_radius"),
+        (Blade, (0.2, 0.1, 0.1), "half_thickness"),
+        (Blade, (0.2, 0.1, 1.0, (0, -1), (0, 1)), "lateral"),
+        (Blade, (0.2, 0.1, 1.0, (0, 0), (0, 1)), "push"),
+        (Blade, (0.2, 0.1, 1.0, (0, -1), (1, 0), 2), "side"),
+        (Ball, (0.0,), "radius"),
+        (Ball, (1.0, (0, 0, 0)), "axis"),
+        (FlatPunch, (0.1, 0.1), "radius"),
+        (FlatPunch, (1.0, 0.0), "edge_radius"),
+        (Plane, ((0, 0),), "normal"),
+    ],
+)
+def test_refuses_what_is_no_tool(kind, arguments, name):
+    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+        kind(*arguments)
+
+
+# -- paths ------------------------------------------------------------------------------------------------------------
+
+
+def test_polyline_goes_straight_and_rests_at_its_ends():
+    path = Path.polyline([1, 2, 4], [(0, 0), (1, 0), (1, -4)])
+    assert path.corners == (1, 2, 4)
+    for time, place in ((0, (0, 0)), (1.5, (0.5, 0)), (3, (1, -2)), (9, (1, -4))):
+        np.testing.assert_allclose(path.position(time), place)
+
+
+def test_saw_goes_to_and_fro_by_its_stroke():
+    path = Path.saw((0, 0, 1), (0, 0, -2), (4, 0, 0), period=0.5)
+    places = np.array([path.position(t) for t in np.linspace(0, 0.5, 401)])
+    assert np.ptp(places[:, 0]) == pytest.approx(4)
+    np.testing.assert_allclose(places[-1], (0, 0, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda: Path.polyline([0, 0], [(0, 0), (1, 1)]), "times"),
+        (lambda: Path.polyline([0, 1], [(0, 0)]), "points"),
+        (lambda: Path.saw((0,), (0,), (0,), 0.0), "period"),
+    ],
+)
+def test_refuses_what_is_no_path(make, name):
+    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+        make()
