@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from math import e, sqrt
 from typing import Protocol, runtime_checkable
 
+import numpy as np
 import ufl
+from numpy.typing import NDArray
 
 from cutsim.checks import require
 from cutsim.kinematics import Expr
@@ -248,3 +250,24 @@ def process_zone_element(law: CohesiveLaw, young: float) -> float:
     Irwin's length E G/t² in stiff ones, where the zone is far longer than the opening.
     """
     return max(0.4 * law.opening, 0.05 * young * law.toughness[0] / law.strength**2)
+
+
+def separation_curve(law: CohesiveLaw, points: int = 400) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fraction of the toughness spent against the opening, in pure opening.
+
+    Args:
+        law: The law.
+        points: Points of the table.
+
+    Returns:
+        Openings from 0 to 40 ε_n [length], and the work of separation up to each over φ_n [–].
+    """
+    openings = 40 * law.opening * np.linspace(0, 1, points) ** 2
+
+    def traction(opening: float) -> float:
+        kappa = law.demand(opening, 0.0)
+        return float(law.stiffness(opening, 0.0, kappa)[0]) * opening
+
+    tractions = np.array([traction(float(d)) for d in openings])
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (tractions[1:] + tractions[:-1]) * np.diff(openings))])
+    return openings, work / law.toughness[0]

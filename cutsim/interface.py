@@ -31,6 +31,8 @@ logger = logging.getLogger(__name__)
 
 # Gauss points on the straight path of the displacement over a step, on which interface work is integrated
 _PATH, _PATH_WEIGHTS = (0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(5), (1.0, 0.0), strict=True))
+# relative distance below its history at which a point still counts as loading
+_AT_HISTORY = 1e-9
 # what is known at each integration point
 _COLUMNS = ("demand", "cohesive_power", "contact_power", "stored", "damage", "opening", "sliding", "pressure")
 
@@ -170,9 +172,18 @@ class Crack(Term):
             return _Response(jump, gap, safe_norm(slide, 1e-12), ufl.as_ufl(0.0), 0 * jump, pressure, n)
         sliding = safe_norm(slide, 1e-12 * self.law.opening)
         demand = self.law.demand(opening, sliding)
-        kappa = ufl.conditional(ufl.gt(demand, self._kappa("+")), demand, self._kappa("+"))
+        kappa = self._history(demand)
         k_n, k_t = self.law.stiffness(opening, sliding, kappa)
         return _Response(jump, gap, sliding, demand, k_n * opening * n + k_t * slide, pressure, n)
+
+    def _history(self, demand: Expr) -> Expr:
+        """Largest demand so far, the present one included.
+
+        A step starts with every point exactly at its history.  There it counts as loading, so that Newton's first tangent
+        is that of the growing crack, and not a mixture of loading and unloading points drawn by rounding.
+        """
+        kappa = self._kappa("+")
+        return ufl.conditional(ufl.gt(demand, (1 - _AT_HISTORY) * kappa), demand, kappa)
 
     # -- history --------------------------------------------------------------------------------------------------
 
@@ -218,7 +229,7 @@ class Crack(Term):
         if self.law is None:
             damage = ufl.as_ufl(1.0)
         else:
-            kappa = ufl.conditional(ufl.gt(r.demand, self._kappa("+")), r.demand, self._kappa("+"))
+            kappa = self._history(r.demand)
             damage = self.law.damage(kappa)[0]
         columns = {
             "demand": r.demand,
@@ -300,7 +311,7 @@ class Crack(Term):
         return f"{self.name}: largest opening {opening:.3g}, largest penetration {max(penetration, 0.0):.3g}"
 
     def record(self) -> dict[str, tuple[float, str]]:
-        """Broken area ∫ D dΓ₀, largest opening, largest penetration (a fraction of the normal mesh size). Collective."""
+        """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
         penetration = max(self._max(-self._trial["opening"]), 0.0) / self.normal_size
         columns = {
             f"{self.name}_opening": (self._max(self._trial["opening"]), "length"),
