@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.checks import require
-from cutsim.cohesive import CohesiveLaw
+from cutsim.cohesive import CohesiveLaw, separation_curve
 from cutsim.contact import Coulomb, PenaltyContact
 from cutsim.interface import Crack, Surface
 from cutsim.loads import Support
@@ -50,6 +50,7 @@ class BladeCut:
         insertion: Duration of the insertion [time].
         tip: Depth of the tip when the push begins [length].
         whole: Factor from the meshed part to the whole block.
+        separation: Table of the law, opening → fraction of the toughness spent.
     """
 
     domain: TaggedMesh
@@ -63,6 +64,7 @@ class BladeCut:
     insertion: float
     tip: float
     whole: float
+    separation: tuple[NDArray[np.float64], NDArray[np.float64]]
 
     @classmethod
     def build(
@@ -123,7 +125,9 @@ class BladeCut:
         plate, supports = _supports(domain, state)
         mechanics = Mechanics(state, [solid, crack, mouth, *halves], [plate, *supports])
         whole = 2.0 if "symmetry" in domain.names else 1.0
-        return cls(domain, state, mechanics, solid, crack, halves, plate, blade, insertion, tip, whole)
+        return cls(
+            domain, state, mechanics, solid, crack, halves, plate, blade, insertion, tip, whole, separation_curve(law)
+        )
 
     def time_of(self, depth: float) -> float:
         """Time at which the tip is this deep below the top [time]."""
@@ -131,39 +135,49 @@ class BladeCut:
         return self.insertion + depth - self.tip
 
     def columns(self, columns: Columns) -> Columns:
-        """Depth of the tip, force of the whole blade, its imbalance with the plate. Collective."""
+        """Depth of the tip, force of the whole blade, its imbalance with the plate, cut area. Collective.
+
+        The cut area counts each point of the crack by the share of its work of separation that belongs to its opening.
+        """
         force = self.whole * sum(half.force()[1] for half in self.halves)
         reaction = self.whole * self.mechanics.reaction(self.plate)
         depth = -float(self.halves[0].position.value[1])
         imbalance = abs(reaction - force) / abs(force) if force else 0.0
-        return {"depth": (depth, "length"), "force": (force, "force"), "imbalance": (imbalance, "one")}
+        cut = self.crack.integral(np.interp(self.crack.point_values("opening"), *self.separation))
+        return {
+            "depth": (depth, "length"),
+            "force": (force, "force"),
+            "imbalance": (imbalance, "one"),
+            "cut": (self.whole * cut, "length" if len(self.halves[0].force()) == 2 else "area"),
+        }
 
 
-def recovered_toughness(history: Mapping[str, NDArray[np.float64]], start: float, end: float) -> float:
+def recovered_toughness(history: Mapping[str, NDArray[np.float64]], start: float, end: float, whole: float) -> float:
     """Toughness from a simulated curve by a balance of work, G = (∫F ds − ΔE − losses)/ΔA [force/length].
 
-    What the tool spends between two depths is not taken from the cohesive law: it is the external work less the elastic
-    energy of body, bond and contact, and less friction and viscous losses; ΔA is the growth of the broken area.
+    What the tool spends between two depths is taken from its force, not from the cohesive law: the external work less
+    the energy held by body and contact, and less friction and viscous losses; ΔA is the growth of the cut area.
 
     Args:
         history: Columns of a run of `BladeCut`.
         start: Depth at which the balance begins [length].
         end: Depth at which it ends [length].
+        whole: Factor from the meshed part to the whole block.
 
     Raises:
-        ValueError: The crack does not grow between the two depths.
+        ValueError: The cut does not grow between the two depths.
     """
-    held = ("strain", "cohesive_stored", "contact", "friction", "viscous")
-    spent = history["work_external"] - sum(history[f"energy_{name}"] for name in held)
+    held = ("strain", "contact", "friction", "viscous")
+    spent = whole * (history["work_external"] - sum(history[f"energy_{name}"] for name in held))
     depth = history["depth"]
+    pushed = np.flatnonzero(np.diff(depth, prepend=-np.inf) > 0)
 
     def grown(column: NDArray[np.float64]) -> float:
-        pushed = np.flatnonzero(np.diff(depth, prepend=-np.inf) > 0)
         first, last = np.interp([start, end], depth[pushed], column[pushed])
         return float(last - first)
 
-    area = grown(history["crack_broken"])
-    require("depths", (start, end), area > 0, "such that the crack grows between them")
+    area = grown(history["cut"])
+    require("depths", (start, end), area > 0, "such that the cut grows between them")
     return grown(spent) / area
 
 

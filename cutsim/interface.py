@@ -164,7 +164,7 @@ class Crack(Term):
         jump = displacement_jump(u)
         gap = ufl.dot(jump, n)
         slide = jump - gap * n
-        opening = ufl.conditional(ufl.gt(gap, 0), gap, 0.0)
+        opening = ufl.conditional(ufl.ge(gap, 0), gap, 0.0)
         multiplier = self._multiplier("+") / self.contact.stiffness if self._allowed_penetration else 0.0
         fade = ufl.exp(-((ufl.dot(jump, jump) / self._range**2) ** 2))
         pressure = fade * self.contact.pressure(multiplier - gap)
@@ -179,8 +179,8 @@ class Crack(Term):
     def _history(self, demand: Expr) -> Expr:
         """Largest demand so far, the present one included.
 
-        A step starts with every point exactly at its history.  There it counts as loading, so that Newton's first tangent
-        is that of the growing crack, and not a mixture of loading and unloading points drawn by rounding.
+        A step starts with every point exactly at its history.  There it counts as loading, so that Newton's first
+        tangent is that of the growing crack, and not a mixture of loading and unloading points drawn by rounding.
         """
         kappa = self._kappa("+")
         return ufl.conditional(ufl.gt(demand, (1 - _AT_HISTORY) * kappa), demand, kappa)
@@ -283,7 +283,8 @@ class Crack(Term):
 
     # -- reductions -----------------------------------------------------------------------------------------------
 
-    def _integral(self, values: NDArray[np.float64]) -> float:
+    def integral(self, values: NDArray[np.float64]) -> float:
+        """Integral over the reference crack of values at the integration points, as `point_values`. Collective."""
         owned = slice(0, self._owned)
         return float(self.state.mesh.comm.allreduce((values * self.weights)[owned].sum(), op=MPI.SUM))
 
@@ -293,11 +294,11 @@ class Crack(Term):
 
     def energies(self) -> dict[str, float]:
         """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""
-        stored = self._integral(self._trial["stored"])
+        stored = self.integral(self._trial["stored"])
         return {
             "cohesive_stored": stored,
-            "fracture": self._integral(self._work["cohesive"]) - stored,
-            "contact": self._integral(self._work["contact"]),
+            "fracture": self.integral(self._work["cohesive"]) - stored,
+            "contact": self.integral(self._work["contact"]),
         }
 
     def damage_increment(self) -> float:
@@ -319,7 +320,7 @@ class Crack(Term):
         }
         if self.law is not None:
             kind = "length" if self.state.mesh.geometry.dim == 2 else "area"
-            columns[f"{self.name}_broken"] = (self._integral(self._trial["damage"]), kind)
+            columns[f"{self.name}_broken"] = (self.integral(self._trial["damage"]), kind)
         return columns
 
     def point_values(self, name: str) -> NDArray[np.float64]:

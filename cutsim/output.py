@@ -213,6 +213,21 @@ class FieldWriter:
         self.close()
 
 
+def interpolate(function: fem.Function, expression: Expr) -> None:
+    """Interpolate a UFL expression, compiled with the project's options. Collective.
+
+    Args:
+        function: What is set, ghosts included.
+        expression: UFL expression of the function's shape on its mesh.
+    """
+    mesh = function.function_space.mesh
+    with jit_cache(mesh.comm):
+        points = function.function_space.element.interpolation_points()
+        compiled = fem.Expression(expression, points, jit_options=JIT_OPTIONS)
+    function.interpolate(compiled)
+    function.x.scatter_forward()
+
+
 @dataclass(frozen=True)
 class _Derived:
     """An expression, sampled where it is accurate and shown on the discontinuous linear space."""

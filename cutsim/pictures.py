@@ -120,6 +120,34 @@ def gather_facets(
     return _assemble(mesh.comm, table, np.full(len(table), kind), nodes[dofs.ravel()], {"u": values}, data)
 
 
+def prism(
+    outline: NDArray[np.float64],
+    origin: Sequence[float],
+    axes: tuple[Sequence[float], Sequence[float]],
+    edge: Sequence[float] | None = None,
+) -> pyvista.PolyData | None:
+    """A tool of constant cross-section, for `draw_body`.
+
+    Args:
+        outline: Cross-section, rows of two coordinates along the axes.
+        origin: Where the outline has its origin; two or three coordinates.
+        axes: Directions of the two coordinates.
+        edge: From one end of the tool to the other; None for a flat picture.
+
+    Returns:
+        The surface, None where pyvista is missing.
+    """
+    try:
+        import pyvista
+    except ImportError as error:
+        logger.warning("no tool is drawn: %s", error)
+        return None
+    first, second, start = (np.pad(np.asarray(v, dtype=float), (0, 3 - len(v))) for v in (*axes, origin))
+    points = start + outline[:, :1] * first + outline[:, 1:] * second
+    face = pyvista.PolyData(points, faces=[len(points), *range(len(points))])
+    return face if edge is None else face.extrude(np.asarray(edge, dtype=float), capping=True)
+
+
 def draw_body(
     path: Path | str,
     grid: pyvista.UnstructuredGrid | None,
@@ -277,9 +305,7 @@ def _require_rows(comm: MPI.Comm, name: str, rows: int, expected: int) -> None:
     require(f"length of {name}", rows, not wrong, f"{expected}, on {wrong} ranks it is not")
 
 
-def _faces(
-    space: fem.FunctionSpace, facets: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _faces(space: fem.FunctionSpace, facets: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Vertex dofs of interior facets, in VTK's order, and the cells behind: one side, then the other."""
     topology, layout = space.mesh.topology, space.dofmap.dof_layout
     tdim = topology.dim
@@ -355,9 +381,7 @@ def _stage(title: str) -> pyvista.Plotter:
 
 
 def _surface(body: pyvista.DataSet) -> pyvista.PolyData:
-    return body.cell_data_to_point_data().extract_surface(
-        algorithm="dataset_surface", nonlinear_subdivision=2
-    )
+    return body.cell_data_to_point_data().extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2)
 
 
 def _add_body(

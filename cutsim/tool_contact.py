@@ -174,7 +174,7 @@ class ToolContact(Term):
 
 def warn_coarse(name: str, shape: Shape, facet_size: float) -> None:
     """Warn with numbers if facets are larger than the smallest radius of a tool."""
-    if facet_size > shape.resolution:
+    if facet_size > (1 + 1e-6) * shape.resolution:
         logger.warning(
             "%s: facets of %.3g do not resolve the tool's radius %.3g: use %.3g or less",
             name, facet_size, shape.resolution, shape.resolution,
