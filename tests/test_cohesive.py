@@ -61,7 +61,7 @@ def test_bilinear_refuses(name):
     good = {"penalty": 200.0, "t_n": 2.0, "G_I": 0.2, "t_t": 3.0, "G_II": 0.5, "eta": 1.7}
     with pytest.raises(ValueError, match=f"{name} = 0 is not allowed"):
         Bilinear(**{**good, name: 0})
-    with pytest.raises(ValueError, match="penalty = 9.0 is not allowed.* = 10"):
+    with pytest.raises(ValueError, match=r"penalty = 9.0 is not allowed.* = 10"):
         Bilinear(**{**good, "penalty": 9.0})
 
 

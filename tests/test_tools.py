@@ -46,7 +46,7 @@ def right_outline():
             arc(centre, R, -np.pi / 2, -HALF),
             dense([centre + normal, joint + normal]),
             arc(joint, R, -HALF, 0),
-            dense([joint + [R, 0], joint + [R, 20]]),
+            dense([joint + np.array([R, 0]), joint + np.array([R, 20])]),
         ]
     )
 
@@ -111,7 +111,7 @@ def test_distance_and_gradient_are_continuous(name):
     shape, outline, _ = OUTLINES[name]
     walk = outline[(np.abs(outline) < 3).all(axis=1)]
     for shift in (0.0, 0.05):
-        points = walk[::100] + [0, shift]
+        points = walk[::100] + np.array([0, shift])
         distance, gradient = values(shape, points)
         step = np.linalg.norm(np.diff(points, axis=0), axis=1)
         together = step < 0.5

@@ -1,0 +1,96 @@
+"""The energy audit: it closes, no dissipation ever falls, and each entry is needed to close it."""
+
+import numpy as np
+import pytest
+from conftest import EXPONENTIAL, NU, E, history, make_blocks
+
+from cutsim.cohesive import Exponential
+from cutsim.contact import PenaltyContact
+from cutsim.energy import EnergyAudit
+from cutsim.loads import Support
+from cutsim.materials import NeoHookean
+from cutsim.mechanics import Mechanics
+from cutsim.stepping import StepControl
+from cutsim.terms import ENTRIES
+
+DISSIPATED = ("fracture", "friction", "viscous")
+WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
+# opening at the top: load, unload, press, load again to failure
+OPENING = ([0, 1, 2, 3, 5], [0.0, 0.25, 0.0, -0.1, 1.2])
+
+
+@pytest.fixture(scope="module")
+def loop():
+    """Two soft blocks pulled, relieved, pressed and pulled apart."""
+    b = make_blocks(n=4)
+    times, values = OPENING
+    corners = tuple(map(float, times))
+    supports = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
+    supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: np.interp(t, times, values), corners=corners))
+    terms = [b.solid(NeoHookean(E, NU), viscosity=0.005), b.crack(WEAK, contact=PenaltyContact(20.0))]
+    return history(Mechanics(b.state, terms, supports), 5.0, StepControl.fixed(0.01))
+
+
+def test_closes_in_every_row(loop):
+    assert np.abs(loop["energy_closure"]).max() < 1e-3
+
+
+def test_no_dissipation_falls(loop):
+    """A step in which a face closes is integrated with five points over a kink, hence the small allowance."""
+    for name in DISSIPATED:
+        assert (np.diff(loop[f"energy_{name}"]) > -1e-6 * loop["energy_fracture"][-1]).all(), name
+
+
+def test_what_is_stored_returns(loop):
+    """Relieved at t = 2, the body stores next to nothing; broken at t = 5, too."""
+    peak = loop["energy_strain"].max()
+    for time in (2.0, 5.0):
+        row = np.argmin(np.abs(loop["time"] - time))
+        assert loop["energy_strain"][row] < 0.01 * peak
+        assert loop["energy_cohesive_stored"][row] < 0.01 * peak
+
+
+@pytest.mark.parametrize("name", ["strain", "cohesive_stored", "fracture", "contact", "viscous"])
+def test_each_entry_matters(loop, name):
+    """Without the entry, the audit would not close."""
+    entries = {n: loop[f"energy_{n}"] for n in ENTRIES}
+    gap = np.abs(loop["work_external"] - sum(e for n, e in entries.items() if n != name))
+    turnover = np.maximum.accumulate(np.maximum(np.abs(loop["work_external"]), sum(map(np.abs, entries.values()))))
+    assert (gap / turnover)[turnover > 0].max() > 3e-3
+
+
+def test_viscous_dissipation_in_closed_form():
+    """Confined stretch at a constant rate a: E = ½(λ² − 1), D = ∫ η Ė² dt = η a (λ³ − 1)/3."""
+    b = make_blocks()
+    rate, viscosity = 0.5, 0.2
+    cells = np.union1d(b.lower, b.upper)
+    supports = [Support(b.state, cells, 0, dim=2), Support(b.state, b.face(1, 0.0), 1)]
+    supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: rate * t, name="top"))
+    # the crack is kept shut by a law that is far too strong to give way
+    law = Exponential.from_parameters(strength=1e5, opening=1.0)
+    terms = [b.solid(NeoHookean(E, NU), viscosity=viscosity), b.crack(law)]
+    rows = history(Mechanics(b.state, terms, supports), 1.0, StepControl.fixed(0.01))
+    assert rows["energy_viscous"][-1] == pytest.approx(viscosity * rate * (1.5**3 - 1) / 3, rel=1e-3)
+    stretch = 1 + rate * rows["time"]
+    stress = 2 * E / (4 * (1 + NU)) * (stretch - 1 / stretch)
+    stress += E * NU / (1 + NU) / (1 - 2 * NU) * np.log(stretch) / stretch + viscosity * rate * stretch**2
+    np.testing.assert_allclose(rows["top_force"], stress, rtol=5e-3)
+
+
+def test_audit_adds_up():
+    audit = EnergyAudit().advance(2.0, [{"strain": 1.0}, {"strain": 0.5, "fracture": 0.25}])
+    assert audit.entries["strain"] == 1.5
+    assert audit.closure == pytest.approx(0.125)
+    later = audit.advance(-1.0, [{"strain": 0.5, "fracture": 0.25}])
+    assert later.external == 1.0
+    assert later.closure == pytest.approx(0.125), "relative to the largest turnover, not the present one"
+    assert audit.entries["strain"] == 1.5, "an audit is a value: a rejected step leaves no trace"
+    assert EnergyAudit().closure == 0.0
+    assert set(audit.record()) == {"work_external", "energy_closure"} | {f"energy_{n}" for n in ENTRIES}
+
+
+def test_scale_keeps_small_energies_from_looking_unbalanced():
+    assert EnergyAudit(scale=1.0).advance(1e-6, []).closure == pytest.approx(1e-6)
+    b = make_blocks()
+    audit = Mechanics(b.state, [b.solid(), b.crack(EXPONENTIAL)]).audit
+    assert audit.scale == pytest.approx(0.5 * EXPONENTIAL.toughness[0]), "the energy that breaks one facet"

@@ -1,0 +1,134 @@
+"""Forces of tools against what balances them, and the work of friction in closed form."""
+
+import numpy as np
+import pytest
+from conftest import NU, E, history, make_blocks
+from dolfinx import fem
+
+from cutsim.assembly import moment
+from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.interface import Surface
+from cutsim.loads import Support
+from cutsim.materials import NeoHookean
+from cutsim.mechanics import Mechanics
+from cutsim.solid import Solid
+from cutsim.state import State
+from cutsim.stepping import StepControl
+from cutsim.tool_contact import ToolContact, warn_coarse
+from cutsim.tools import Ball, Blade, Path, Plane
+
+CONTACT = PenaltyContact(60.0, blend=0.01)
+FRICTION = Coulomb(0.3, 1e-3)
+
+
+def indented(gdim, friction=FRICTION):
+    """A block on a fixed base, indented by a ball that then drags along its top."""
+    b = make_blocks(gdim, n=4)
+    state = State(fem.functionspace(b.state.mesh, ("Lagrange", 1, (gdim,))))
+    down, along = np.eye(gdim)[-1], np.eye(gdim)[0]
+    start = 0.45 * np.ones(gdim) + (1.35 - 0.45) * down
+    path = Path.polyline([0, 1, 2], [start, start - 0.2 * down, start - 0.2 * down + 0.1 * along])
+    top = Surface(state.measures.exterior(b.face(gdim - 1, 1.0)))
+    ball = ToolContact(state, Ball(0.35), path, [top], contact=CONTACT, friction=friction)
+    supports = [Support(state, b.face(gdim - 1, 0.0), i, name=f"base_{'xyz'[i]}") for i in range(gdim)]
+    return Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], supports, rtol=1e-11), ball
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_tool_balances_the_supports(gdim):
+    """The force on the tool is that of the supports on the body, and so is the moment about the tool."""
+    mechanics, ball = indented(gdim)
+    rows = history(mechanics, 2.0, StepControl.fixed(0.2))
+    force = np.array([rows[f"tool_force_{a}"] for a in "xyz"[:gdim]])
+    support = np.array([rows[f"base_{a}_force"] for a in "xyz"[:gdim]])
+    np.testing.assert_allclose(force, support, atol=1e-6 * np.abs(force).max())
+    assert force[-1].min() >= 0, "the body pushes the tool up"
+    assert force[0, -1] < 0, "friction holds the tool back"
+    state = mechanics.state
+    mechanics.begin(2.1)
+    assert mechanics.solve().converged
+    mechanics.evaluate()
+    residual = mechanics.problem.residual()
+    places = state.V.tabulate_dof_coordinates()
+    base = np.repeat(np.isclose(places[:, gdim - 1], 0), gdim)
+    arms = places.copy()
+    arms[:, :gdim] += state.u.x.array.reshape(-1, gdim) - ball.position.value
+    couple = moment(state.mesh.comm, np.where(base, residual.array, 0.0), arms, gdim)
+    residual.destroy()
+    np.testing.assert_allclose(ball.moment(), couple, atol=1e-6 * np.abs(force).max())
+    assert np.abs(couple).max() > 1e-2 * np.abs(force).max()
+
+
+def test_frictionless_contact_force_is_the_derivative_of_its_energy():
+    mechanics, ball = indented(2, friction=None)
+    history(mechanics, 1.0, StepControl.fixed(0.5))
+    h, place = 1e-6, ball.position.value.copy()
+    for i, force in enumerate(ball.force()):
+        energies = []
+        for step in (h, -h):
+            ball.position.value[i] = place[i] + step
+            energies.append(ball.energies()["contact"])
+        ball.position.value[:] = place
+        assert force == pytest.approx(-(energies[0] - energies[1]) / (2 * h), abs=1e-7)
+
+
+def rigid_block_under_plate(path, friction):
+    """A block that does not move at all under a moving plate: the penetration is that of the path."""
+    b = make_blocks()
+    top = Surface(b.state.measures.exterior(b.face(1, 1.0)))
+    plate = ToolContact(b.state, Plane((0.0, -1.0)), path, [top], contact=PenaltyContact(50.0), friction=friction)
+    cells = np.union1d(b.lower, b.upper)
+    return Mechanics(b.state, [plate], b.drive(cells, [0.0, 0.0], "base"))
+
+
+def test_friction_dissipates_mu_p_times_the_slip():
+    """A plate 0.02 deep slides 0.5 to and fro: p = ε d, D = μ p A s, never falling; the base carries μ p A."""
+    path = Path.polyline([0, 1, 2, 4], [(0, 1), (0, 0.98), (0.5, 0.98), (-0.5, 0.98)])
+    rows = history(rigid_block_under_plate(path, FRICTION), 4.0, StepControl.fixed(0.01))
+    pressure = 50 * 0.02
+    slid = rows["time"] > 1.011
+    np.testing.assert_allclose(np.abs(rows["base_x_force"][slid]), 0.3 * pressure, rtol=0.03)
+    assert np.sign(rows["tool_force_x"][150]) == -1, "friction on the tool opposes its motion"
+    dissipated = rows["energy_friction"]
+    assert dissipated[-1] == pytest.approx(0.3 * pressure * 1.5, rel=0.03)
+    assert (np.diff(dissipated) > -1e-12).all()
+    assert np.abs(rows["energy_closure"]).max() < 1e-2
+
+
+def test_tool_without_contact_does_nothing():
+    path = Path.polyline([0, 1], [(0, 1.5), (0.5, 1.1)])
+    rows = history(rigid_block_under_plate(path, FRICTION), 1.0, StepControl.fixed(0.5))
+    for name in ("tool_force_x", "tool_force_y", "tool_moment_z", "energy_contact", "energy_friction"):
+        assert not rows[name].any()
+
+
+def test_corners_of_the_path_are_those_of_the_tool():
+    path = Path.polyline([0, 0.3, 1], [(0, 1.5), (0.5, 1.5), (0, 1.5)])
+    rows = history(rigid_block_under_plate(path, None), 1.0, StepControl.fixed(0.2))
+    assert 0.3 in rows["time"]
+
+
+def test_refuses_what_cannot_touch():
+    b = make_blocks()
+    path = Path(lambda t: np.zeros(2))
+    surface = Surface(b.state.measures.exterior(b.face(1, 1.0)))
+    with pytest.raises(ValueError, match="surfaces = 0 is not allowed"):
+        ToolContact(b.state, Ball(1.0), path, [], contact=CONTACT)
+    with pytest.raises(ValueError, match=r"path = .* 2 components"):
+        ToolContact(b.state, Ball(1.0), Path(lambda t: np.zeros(3)), [surface], contact=CONTACT)
+    with pytest.raises(ValueError, match="mu = -1 is not allowed"):
+        Coulomb(-1, 0.1)
+    with pytest.raises(ValueError, match="slip = 0 is not allowed"):
+        Coulomb(0.1, 0)
+    with pytest.raises(ValueError, match="stiffness = 0 is not allowed"):
+        PenaltyContact(0)
+    with pytest.raises(ValueError, match="blend = -1 is not allowed"):
+        PenaltyContact(1.0, -1)
+
+
+def test_coarse_mesh_is_named_with_numbers(caplog):
+    blade = Blade(0.2, 0.05, 0.5)
+    warn_coarse("blade", blade, 0.05)
+    assert not caplog.records
+    warn_coarse("blade", blade, 0.2)
+    assert "0.2" in caplog.text and "0.05" in caplog.text
