@@ -32,7 +32,9 @@ test-mpi: $(STAMP) ## run the tests marked mpi on 2 and 3 ranks
 	done
 
 bench: $(STAMP) ## print wall time, iterations and peak memory of the reference problems
-	scripts/run -n $(or $(RANKS),1) bench/bench.py $(ARGS)
+	for name in cube dcb blade; do echo "== $$name"; \
+	    scripts/run -n $(or $(RANKS),1) tests/benchmarks/bench_$$name.py || exit 1; \
+	done
 
 lint: $(STAMP) ## ruff and mypy
 	$(PYTHON_IN_VENV) -m ruff check .

@@ -9,6 +9,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from math import isfinite
 from types import FrameType
 
 from mpi4py import MPI
@@ -21,6 +22,8 @@ logger = logging.getLogger(__name__)
 
 # a step that would leave less than this fraction of itself before a corner is stretched to meet it
 _SLIVER = 0.1
+# corners that differ by less than this fraction of the smallest step are one
+_ROUNDING = 1e-6
 
 
 class StepError(RuntimeError):
@@ -125,11 +128,11 @@ def run(
     """
     state = mechanics.state
     require("until", until, until > state.time_old, f"> the present time {state.time_old}")
-    corners = [c for c in (*mechanics.corners, until) if state.time_old < c <= until]
+    corners = [c for c in (*mechanics.corners, until) if c <= until]
     dt, report, number = control.first, None, 0
     with _interruptible(state.mesh.comm) as interrupted:
-        while state.time_old < until:
-            corner = min(c for c in corners if c > state.time_old)
+        while ahead := [c for c in corners if c > state.time_old + _ROUNDING * control.smallest]:
+            corner = min(ahead)
             report = _advance(mechanics, control, dt, corner)
             number += 1
             report.number = number
@@ -164,17 +167,16 @@ def _advance(mechanics: Mechanics, control: StepControl, dt: float, corner: floa
 
 def _attempt(mechanics: Mechanics, control: StepControl, end: float) -> tuple[Outcome, str | None]:
     """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
+    before = mechanics.audit.closure
     for line_search in control.line_searches:
         mechanics.rollback()
         mechanics.begin(end)
         outcome = mechanics.solve(line_search)
-        if outcome.converged:
+        failure = _failure(mechanics, outcome)
+        if failure is None:
             break
     else:
-        where = mechanics.diagnose()
-        return outcome, f"{outcome.message} after {outcome.iterations} iterations" + (f"; {where}" if where else "")
-    before = mechanics.audit.closure
-    mechanics.evaluate()
+        return outcome, failure
     growth = mechanics.damage_increment()
     if control.damage is not None and growth > control.damage:
         return outcome, f"damage grows by {growth:.3g}, more than {control.damage:g}"
@@ -182,6 +184,18 @@ def _attempt(mechanics: Mechanics, control: StepControl, end: float) -> tuple[Ou
     if control.closure is not None and drift > control.closure:
         return outcome, f"energy closure changes by {drift:.2g}, more than {control.closure:g}"
     return outcome, None
+
+
+def _failure(mechanics: Mechanics, outcome: Outcome) -> str | None:
+    """Why a solve did not give an admissible state, in words; None if it did, and then the state is evaluated."""
+    if outcome.converged:
+        mechanics.evaluate()
+        # forces can balance around an inverted element, but then its energy has no value
+        if isfinite(mechanics.trial_audit.closure):
+            return None
+    why = "no admissible equilibrium" if outcome.converged else outcome.message
+    where = mechanics.diagnose()
+    return f"{why} after {outcome.iterations} iterations" + (f"; {where}" if where else "")
 
 
 def _next_step(control: StepControl, report: StepReport, dt: float, *, at_corner: bool) -> float:

@@ -1,0 +1,42 @@
+"""The frictionless plane cut: E = 0.777 MPa, nu = 0.45, G_c = 0.2 N/mm, tip radius and mesh size 0.05 mm, to 3 mm.
+
+Prints set-up time (compiled kernels cached), wall time, steps, iterations, memory, energy closure and the force.
+Runs on any number of ranks.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from common import measure
+from mpi4py import MPI
+
+from cutsim import Blade, Exponential, NeoHookean, StepControl, StepReport, read_geo, run
+from cutsim.cutting import BladeCut
+
+MESH = Path(__file__).parents[2] / "meshes" / "block.geo"
+BLOCK = {"dim": 2, "Lx": 10.0, "H": 6.0, "lc": 0.05, "band": 0.4, "notch": 0.5}
+
+
+def main() -> None:
+    """Print one line."""
+    comm, reports = MPI.COMM_WORLD, list[StepReport]()
+    with measure(comm) as build:
+        law = Exponential.from_parameters(strength=0.6, toughness=0.2)
+        blade = Blade(np.radians(12), 0.05, 0.855)
+        domain = read_geo(MESH, comm, BLOCK, gdim=2)
+        cut = BladeCut.build(domain, NeoHookean(0.777, 0.45), law, blade, notch=0.5, viscosity=0.002)
+    with measure(comm) as usage:
+        run(cut.mechanics, cut.time_of(3.0), StepControl(first=0.02, largest=0.1), reports.append)
+    force = cut.columns({})["force"][0]
+    if comm.rank == 0:
+        print("   dofs  ranks  set-up [s]  wall [s]  steps  cuts  Newton  Krylov  memory [GB]  closure  force [N/mm]")
+        print(
+            f"{2 * cut.state.V.dofmap.index_map.size_global:7d} {comm.size:6d} {build.wall:11.2f} {usage.wall:9.2f}"
+            f" {len(reports):6d} {sum(r.cuts for r in reports):5d} {sum(r.outcome.iterations for r in reports):7d}"
+            f" {sum(r.outcome.linear_iterations for r in reports):7d} {usage.memory:12.2f}"
+            f" {cut.mechanics.audit.closure:8.1e} {force:13.4f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
