@@ -213,7 +213,7 @@ class Crack(Term):
         self._trial = {name: np.zeros(shape) for name in _COLUMNS}
         self._work = {name: np.zeros(shape) for name in ("cohesive", "contact")}
         self._work_old = {name: np.zeros(shape) for name in self._work}
-        self._damage_old = np.zeros(shape)
+        self._trial_old = self._trial
 
     def _assemble(self, compiled: fem.Form) -> NDArray[np.float64]:
         """Point vector, shape (local crack facets, points, columns), equal on owner and ghosts."""
@@ -260,18 +260,23 @@ class Crack(Term):
         self._trial = self._evaluate_at(1.0)
 
     def augment(self) -> bool:
-        """Uzawa step λ ← p if a point penetrates more than allowed (thesis 4.33). Collective."""
+        """Uzawa step λ ← p (thesis 4.33) if a closed point is off by more than is allowed. Collective.
+
+        p − λ is the penalty times the penetration; where the crack has opened again, it is what λ still pushes.
+        """
         if self._allowed_penetration is None:
             return False
-        values = self._evaluate_at(1.0)
-        if self._max(-values["opening"]) <= self._allowed_penetration:
+        pressure = self._evaluate_at(1.0)["pressure"]
+        change = np.abs(pressure - self._multiplier.x.array[self._scalar_dofs])
+        if self._max(change) <= self.contact.stiffness * self._allowed_penetration:
             return False
-        self._multiplier.x.array[self._scalar_dofs] = values["pressure"]
+        self._multiplier.x.array[self._scalar_dofs] = pressure
         return True
 
     def rollback(self) -> None:
-        """Restore the contact multiplier of the committed state."""
+        """Restore the contact multiplier, and what is known at the points, of the committed state."""
         self._multiplier.x.array[:] = self._multiplier_old
+        self._trial, self._work = self._trial_old, self._work_old
 
     def commit(self) -> None:
         """Adopt history, work and multiplier of the step."""
@@ -279,7 +284,7 @@ class Crack(Term):
         kappa[self._scalar_dofs] = np.maximum(kappa[self._scalar_dofs], self._trial["demand"])
         self._multiplier_old[:] = self._multiplier.x.array
         self._work_old = self._work
-        self._damage_old = self._trial["damage"]
+        self._trial_old = self._trial
 
     # -- reductions -----------------------------------------------------------------------------------------------
 
@@ -303,7 +308,7 @@ class Crack(Term):
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
-        return self._max(self._trial["damage"] - self._damage_old) if self.law is not None else 0.0
+        return self._max(self._trial["damage"] - self._trial_old["damage"]) if self.law is not None else 0.0
 
     def diagnose(self) -> str | None:
         """Say where the trial state of the last solve opens or closes most. Collective."""

@@ -127,7 +127,7 @@ class Traction(Term):
 
     def rollback(self) -> None:
         """Set the load back to the start of the step."""
-        self._scale.value = self._scale_old
+        self._scale.value, self._forces = self._scale_old, self._forces_old
 
     def evaluate(self) -> None:
         """Nodal forces of the load. Collective."""

@@ -102,6 +102,9 @@ class Mechanics:
                 iterations=outcome.iterations + again.iterations,
                 linear_iterations=outcome.linear_iterations + again.linear_iterations,
             )
+        else:
+            message = f"contact not settled by {AUGMENTATIONS} augmentations"
+            outcome = replace(outcome, converged=False, message=message)
         return outcome
 
     def evaluate(self) -> None:
@@ -151,6 +154,7 @@ class Mechanics:
             term.rollback()
         for support in self.supports:
             support.begin(self.state.time)
+        self._trial_audit, self._residual = self.audit, self._residual_old
 
     def commit(self) -> None:
         """Adopt the trial step."""

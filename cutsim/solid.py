@@ -124,6 +124,10 @@ class Solid(Term):
         local = float(np.nan_to_num(values, nan=-np.inf).min()) if values.size else np.inf
         return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
 
+    def rollback(self) -> None:
+        """Forget the viscous dissipation of the step."""
+        self._viscous = self._viscous_old
+
     def commit(self) -> None:
         """Adopt the viscous dissipation."""
         self._viscous_old = self._viscous

@@ -99,6 +99,8 @@ class ToolContact(Term):
     def rollback(self) -> None:
         """Move the tool back to the start of the step."""
         self.position.value[:] = self.position_old.value
+        self._forces, self._rubbing = self._forces_old, self._rubbing_old
+        self._friction_work = self._friction_work_old
 
     def evaluate(self) -> None:
         """Contact forces of the trial state and friction work of the step (trapezoidal). Collective."""

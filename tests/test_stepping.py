@@ -1,0 +1,266 @@
+"""Rejected steps leave no trace, failures are named, corners are met, and a signal ends a run after its step."""
+
+import signal
+
+import numpy as np
+import pytest
+import ufl
+from conftest import EXPONENTIAL, NU, E, history, make_blocks
+from mpi4py import MPI
+
+from cutsim.cohesive import Exponential
+from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.interface import Surface
+from cutsim.loads import Support, Traction
+from cutsim.materials import NeoHookean
+from cutsim.mechanics import Mechanics
+from cutsim.output import read_history
+from cutsim.recording import Recording
+from cutsim.stepping import StepControl, StepError, run
+from cutsim.tool_contact import ToolContact
+from cutsim.tools import Path, Plane
+
+WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
+
+
+def everything(comm=MPI.COMM_WORLD):
+    """A problem with every kind of term: body, viscosity, crack with multipliers, rough tool, load, supports."""
+    b = make_blocks(n=4, comm=comm)
+    path = Path.polyline([0, 1], [(0.5, 1.02), (0.6, 0.92)])
+    left, right = b.face(0, 0.0), b.face(0, 1.0)
+    crack = b.crack(WEAK, penetration=1e-4, contact=PenaltyContact(20.0))
+    plate = ToolContact(
+        b.state,
+        Plane((0.0, -1.0)),
+        path,
+        [Surface(b.state.measures.exterior(b.face(1, 1.0)))],
+        contact=PenaltyContact(30.0, 0.01),
+        friction=Coulomb(0.3, 1e-3),
+    )
+    load = Traction(b.state, right, (0.02, 0.0), lambda t: t)
+    solid = b.solid(NeoHookean(E, NU), viscosity=0.01)
+    supports = [
+        Support(b.state, b.face(1, 0.0), 0),
+        Support(b.state, b.face(1, 0.0), 1, lambda t: 0.02 * t, name="base"),
+        Support(b.state, left, 0),
+    ]
+    return Mechanics(b.state, [solid, crack, plate, load], supports)
+
+
+def opening_blocks(comm=MPI.COMM_WORLD, law=WEAK):
+    """Two blocks pulled apart until the crack between them has broken."""
+    b = make_blocks(comm=comm)
+    supports = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
+    supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: t, name="top"))
+    return Mechanics(b.state, [b.solid(NeoHookean(E, NU)), b.crack(law)], supports)
+
+
+def snapshot(mechanics):
+    """Every number that a step may change, as bytes."""
+    state, (_, crack, plate, load) = mechanics.state, mechanics.terms
+    arrays = [state.u.x.array, state.u_old.x.array, crack._kappa.x.array, crack._multiplier.x.array]
+    arrays += [plate.position.value, plate.position_old.value, load._scale.value]
+    arrays += [s._value.value for s in mechanics.supports]
+    arrays += [crack.point_values(name) for name in ("damage", "opening", "pressure", "dissipated")]
+    arrays += [plate.force(), plate.moment(), [state.time, state.time_old]]
+    energies = [value for term in mechanics.terms for value in term.energies().values()]
+    record = [value for value, _ in mechanics.record().values()]
+    return [np.asarray(a, dtype=float).tobytes() for a in [*arrays, energies, record]]
+
+
+@pytest.mark.mpi
+def test_rollback_is_bit_for_bit():
+    mechanics = everything()
+    run(mechanics, 0.5, StepControl.fixed(0.1))
+    before = snapshot(mechanics)
+    crack = mechanics.terms[1]
+    assert mechanics.state.mesh.comm.allreduce(crack._multiplier.x.array.any(), MPI.LOR), "the test needs multipliers"
+    mechanics.begin(0.8)
+    assert mechanics.solve().converged
+    mechanics.evaluate()
+    assert snapshot(mechanics) != before
+    mechanics.rollback()
+    assert snapshot(mechanics) == before
+
+
+class Failing:
+    """Makes chosen solves of a problem fail, leaving rubbish in the unknown."""
+
+    def __init__(self, mechanics, fail):
+        self.mechanics, self.fail, self.calls, self.searches = mechanics, fail, 0, []
+        self._solve, mechanics.solve = mechanics.solve, self
+
+    def __call__(self, line_search=None):
+        from dataclasses import replace
+
+        outcome = self._solve(line_search)
+        self.calls += 1
+        self.searches.append(line_search)
+        if self.fail(self.calls):
+            self.mechanics.state.u.x.array[:] = np.nan
+            return replace(outcome, converged=False, message="made to fail")
+        return outcome
+
+
+@pytest.mark.mpi
+def test_run_goes_on_after_failures():
+    """The third step fails with both line searches and is cut; the end is that of a run with the same times."""
+    control = StepControl(0.2, 0.2, line_searches=("basic", "bt"))
+    failing = everything()
+    watch = Failing(failing, lambda call: call in (3, 4))
+    reports = []
+    run(failing, 1.0, control, reports.append)
+    assert watch.searches[2:5] == ["basic", "bt", "basic"]
+    assert [r.cuts for r in reports[:4]] == [0, 0, 1, 0]
+    assert reports[2].dt == pytest.approx(0.1)
+    assert reports[-1].time == 1.0
+    again = everything()
+    for report in reports:
+        again.begin(report.time)
+        assert again.solve("basic").converged
+        again.evaluate()
+        again.commit()
+    assert snapshot(failing) == snapshot(again)
+
+
+def test_another_line_search_saves_the_step():
+    mechanics = opening_blocks()
+    watch = Failing(mechanics, lambda call: call == 1)
+    report = run(mechanics, 0.1, StepControl.fixed(0.1))
+    assert report.cuts == 0
+    assert watch.searches == ["l2", "bt"]
+
+
+def test_smallest_step_is_named_and_history_is_kept(tmp_path):
+    """A block pressed through itself: no step gets through, and the error says when, where and why."""
+    b = make_blocks()
+    supports = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
+    supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: -t if t < 0.35 else -2.0, name="top"))
+    mechanics = Mechanics(b.state, [b.solid(NeoHookean(E, NU), name="gel"), b.crack(WEAK)], supports)
+    with pytest.raises(StepError) as error, Recording(tmp_path, mechanics, 1.0) as record:
+        run(mechanics, 1.0, StepControl(0.1, 0.1, smallest=0.02), record)
+    message = str(error.value)
+    for word in ("from time 0.3", "smallest = 0.02", "iterations", "crack: largest opening"):
+        assert word in message
+    rows = read_history(tmp_path / "history.csv")
+    assert rows["time"][-1] == pytest.approx(mechanics.state.time_old)
+    assert rows["top_force"][-1] == pytest.approx(record.history["top_force"][-1])
+    assert mechanics.state.time == mechanics.state.time_old == pytest.approx(0.34, abs=0.02)
+    assert mechanics.terms[0].diagnose() is None, "the state is the last good one"
+
+
+def test_limit_on_damage_makes_steps_smaller():
+    free, limited = [], []
+    run(opening_blocks(), 0.6, StepControl.fixed(0.05), free.append)
+    mechanics = opening_blocks()
+    growth = []
+    crack = mechanics.terms[1]
+    commit = crack.commit
+    crack.commit = lambda: (growth.append(crack.damage_increment()), commit())
+    run(mechanics, 0.6, StepControl(0.05, 0.05, damage=0.05), limited.append)
+    assert max(growth) <= 0.05 < 1.2 * max(growth) + 0.02
+    assert sum(r.cuts for r in limited) > 0 == sum(r.cuts for r in free)
+    assert crack.record()["crack_broken"][0] > 0.9
+
+
+def test_limit_on_closure_makes_steps_smaller():
+    reports = []
+    run(opening_blocks(), 0.6, StepControl(0.05, 0.05, closure=2e-4), reports.append)
+    closures = np.array([0.0, *[r.columns["energy_closure"][0] for r in reports]])
+    assert np.abs(np.diff(closures)).max() <= 2e-4
+    assert sum(r.cuts for r in reports) > 0
+
+
+def test_every_corner_is_met():
+    """Corners of a support, of a load and of a path, though no multiple of the step; none is passed by rounding."""
+    b = make_blocks()
+    supports = [Support(b.state, b.face(1, 0.0), i, corners=(0.123,)) for i in range(2)]
+    load = Traction(b.state, b.face(1, 1.0), (0.0, -1e-3), lambda t: t, corners=(0.3, 0.7))
+    plate = ToolContact(
+        b.state,
+        Plane((0.0, -1.0)),
+        Path.polyline([0.1 * 3, 0.5], [(0, 2), (0, 3)]),
+        [Surface(b.state.measures.exterior(b.face(1, 1.0)))],
+        contact=PenaltyContact(1.0),
+    )
+    mechanics = Mechanics(b.state, [b.solid(), b.crack(EXPONENTIAL), load, plate], supports)
+    rows = history(mechanics, 1.0, StepControl(0.04, 0.2, growth=2.0))
+    assert {0.123, 0.3, 0.5, 0.7, 1.0} <= set(rows["time"])
+    steps = np.diff([0.0, *rows["time"]])
+    assert steps.min() > 1e-3, "corners that differ by rounding are one"
+    assert steps.max() <= 0.2 * 1.1
+
+
+def test_steps_grow_while_they_are_easy():
+    rows = history(opening_blocks(law=EXPONENTIAL), 0.02, StepControl(1e-3, 4e-3, growth=1.5))
+    steps = np.diff([0.0, *rows["time"]])
+    np.testing.assert_allclose(steps[:4], [1e-3, 1.5e-3, 2.25e-3, 3.375e-3])
+    assert steps.max() <= 4e-3 * 1.1
+
+
+def test_stop_ends_the_run():
+    report = run(opening_blocks(), 1.0, StepControl.fixed(0.05), stop=lambda r: r.number == 3)
+    assert (report.number, report.time) == (3, pytest.approx(0.15))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signal_ends_the_run_after_its_step(number, tmp_path):
+    """Sent to one rank only, in the middle of a step: all ranks stop after it, with all they have on disk."""
+    comm = MPI.COMM_WORLD
+    folder = comm.bcast(tmp_path)
+    mechanics = opening_blocks()
+    solve = mechanics.solve
+
+    def solve_interrupted(line_search=None):
+        if mechanics.state.time > 0.12 and comm.rank == 0 and not interrupted:
+            interrupted.append(True)
+            signal.raise_signal(number)
+        return solve(line_search)
+
+    interrupted, before = [], signal.getsignal(number)
+    mechanics.solve = solve_interrupted
+    with Recording(folder, mechanics, 1.0) as record:
+        report = run(mechanics, 1.0, StepControl.fixed(0.05), record)
+    assert report.time == pytest.approx(0.15)
+    assert signal.getsignal(number) == before
+    comm.barrier()
+    rows = read_history(folder / "history.csv")
+    np.testing.assert_allclose(rows["time"], [0.05, 0.1, 0.15])
+    np.testing.assert_allclose(rows["top_force"], record.history["top_force"], rtol=1e-6)
+    mechanics.solve = solve
+    assert run(mechanics, 0.2, StepControl.fixed(0.05)).time == 0.2, "and the run can go on"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name"),
+    [
+        ({"first": 0}, "first"),
+        ({"largest": 0.05}, "largest"),
+        ({"smallest": 0.2}, "smallest"),
+        ({"growth": 1.0}, "growth"),
+        ({"cut": 1.0}, "cut"),
+        ({"damage": 0.0}, "damage"),
+        ({"closure": 0.0}, "closure"),
+        ({"line_searches": ()}, "line_searches"),
+    ],
+)
+def test_refuses_what_cannot_step(arguments, name):
+    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+        StepControl(**{"first": 0.1, "largest": 0.1, **arguments})
+
+
+def test_refuses_a_time_in_the_past():
+    mechanics = opening_blocks()
+    run(mechanics, 0.1, StepControl.fixed(0.1))
+    with pytest.raises(ValueError, match=r"until = 0.1 is not allowed"):
+        run(mechanics, 0.1, StepControl.fixed(0.1))
+
+
+def test_refuses_ambiguous_names():
+    b = make_blocks()
+    with pytest.raises(ValueError, match="names = .* is not allowed"):
+        Mechanics(b.state, [b.solid(), b.solid()])
+    with pytest.raises(ValueError, match="terms = 0 is not allowed"):
+        Mechanics(b.state, [])
+    assert isinstance(b.solid().residual(ufl.TestFunction(b.state.V)), ufl.Form)
