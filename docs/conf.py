@@ -1,0 +1,47 @@
+"""Sphinx: Markdown pages, the demos as rendered scripts (not run), and the API from its docstrings."""
+
+import re
+import sys
+from pathlib import Path
+
+import cutsim
+
+sys.path.insert(0, str(Path(__file__).parent))  # for demo_reader
+
+project = "cutsim"
+author = "cutsim contributors"
+project_copyright = author
+release = version = cutsim.__version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["_build", "conf.py", "demo_reader.py", "figures", "**/__pycache__", "**/.ipynb_checkpoints"]
+
+# demos/ is linked into this folder; its light scripts are read as notebooks and shown without running them
+nb_custom_formats = {".py": "demo_reader.read"}
+nb_execution_mode = "off"
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+default_role = "py:obj"
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True, "show-inheritance": True}
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+
+html_theme = "furo"
+html_title = f"cutsim {release}"
+html_theme_options = {"navigation_with_keys": True}
+
+
+def plain_text(app, what, name, obj, options, lines):
+    """In docstrings bars are absolute values and ``cut_`` is a name: no markup of reStructuredText."""
+    for i, line in enumerate(lines):
+        parts = re.split(r"(``?[^`]+``?)", line)
+        lines[i] = "".join(p if p.startswith("`") else re.sub(r"\||_(?!\w)", r"\\\g<0>", p) for p in parts)
+
+
+def setup(app):
+    """Called by Sphinx."""
+    app.connect("autodoc-process-docstring", plain_text, priority=100)

@@ -1,0 +1,75 @@
+"""Draw the figures of the pages: python docs/figures/make_figures.py."""
+
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("svg")
+import matplotlib.pyplot as plt
+from matplotlib.patches import FancyBboxPatch
+
+HERE = Path(__file__).parent
+BLUE, GREEN, RED, GREY = "#dbe9f6", "#dff0df", "#f9dfdc", "#eeeeee"
+
+
+def box(ax, x, y, title, text, colour, width=4.0, height=0.86):
+    """A rounded box centred on a point: a title and what happens."""
+    corner = x - width / 2, y - height / 2
+    ax.add_patch(FancyBboxPatch(corner, width, height, "round,pad=0.02,rounding_size=0.1", fc=colour, ec="#555555"))
+    ax.text(x, y + 0.17, title, ha="center", va="center", weight="bold", size=10.5)
+    ax.text(x, y - 0.18, text, ha="center", va="center", size=8.5)
+
+
+def arrow(ax, start, end, label="", shift=(0.0, 0.0), bend=0.0, align="left"):
+    """An arrow with a label beside its middle."""
+    style = {"arrowstyle": "-|>", "color": "#333333", "lw": 1.3, "connectionstyle": f"arc3,rad={bend}"}
+    ax.annotate("", end, start, arrowprops=style)
+    x, y = (start[0] + end[0]) / 2 + shift[0], (start[1] + end[1]) / 2 + shift[1]
+    ax.text(x, y, label, ha=align, va="center", size=8.5, style="italic")
+
+
+def step(path):
+    """Data flow of one step."""
+    fig, ax = plt.subplots(figsize=(9.6, 7.4))
+    ax.set(xlim=(-2.9, 9.2), ylim=(-0.7, 8.6))
+    ax.set_aspect("equal")
+    ax.axis("off")
+    column = [
+        ("begin", "time and step size: state", BLUE),
+        ("move", "tools, loads, supports: constants only", BLUE),
+        ("solve", "trial displacement: solver, Uzawa", BLUE),
+        ("evaluate", "trial history, work along the path, audit", BLUE),
+        ("accept?", "damage growth, energy closure", GREY),
+        ("commit", "trial → committed; only here", GREEN),
+        ("record", "history row, fields, progress", GREEN),
+    ]
+    y = [8.0 - 1.35 * i for i in range(len(column))]
+    for height, (title, text, colour) in zip(y, column, strict=True):
+        box(ax, 0, height, title, text, colour)
+    labels = ["", "", "converged", "", "yes", ""]
+    for above, below, label in zip(y, y[1:], labels, strict=False):
+        arrow(ax, (0, above - 0.47), (0, below + 0.47), label, shift=(0.12, 0.0))
+    x = 6.6
+    box(ax, x, y[2], "roll back", "displacement, constants,\nmultipliers: bit for bit", RED, 3.8, 1.15)
+    ax.texts[-2].set_y(y[2] + 0.34)
+    box(ax, x, y[1] + 0.25, "next line search", "same step again", RED, 3.8)
+    box(ax, x, y[4], "smaller step", "dt × cut", RED, 3.8)
+    box(ax, x, y[6], "StepError", "when, why, where; history complete", GREY, 3.8)
+    arrow(ax, (2.05, y[2]), (x - 1.95, y[2]), "failed", shift=(-0.25, 0.17))
+    arrow(ax, (x, y[2] + 0.62), (x, y[1] - 0.22), "one is left", shift=(0.1, 0.0))
+    arrow(ax, (x - 1.95, y[1] + 0.35), (2.05, y[0] - 0.1))
+    arrow(ax, (x, y[2] - 0.62), (x, y[4] + 0.47), "none is left", shift=(0.1, 0.0))
+    arrow(ax, (2.05, y[4]), (x - 1.95, y[4]), "no: roll back", shift=(-0.6, 0.17))
+    arrow(ax, (x, y[4] - 0.47), (x, y[6] + 0.47), "below the smallest", shift=(0.1, 0.0))
+    ax.plot([x + 1.95, 9.0, 9.0, 2.6], [y[4], y[4], y[0] + 0.15, y[0] + 0.15], color="#333333", lw=1.3)
+    arrow(ax, (2.6, y[0] + 0.15), (2.05, y[0] + 0.15))
+    ax.plot([-2.05, -2.4, -2.4], [y[6], y[6], y[0]], color="#333333", lw=1.3)
+    arrow(ax, (-2.4, y[0]), (-2.05, y[0]))
+    ax.text(-2.62, y[3], "next step", rotation=90, va="center", ha="center", size=8.5, style="italic")
+    fig.savefig(path, bbox_inches="tight", metadata={"Date": None})
+    plt.close(fig)
+
+
+if __name__ == "__main__":
+    matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "cutsim", "font.family": "sans-serif"})
+    step(HERE / "step.svg")

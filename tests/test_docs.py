@@ -1,0 +1,132 @@
+"""The pages say what the code does: their Python runs, and their examples pass the tests of what they extend."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import test_crack
+import test_materials
+import test_tangents
+import test_tools
+from conftest import make_blocks
+
+from cutsim.cohesive import CohesiveLaw
+from cutsim.contact import PenaltyContact
+from cutsim.interface import Surface
+from cutsim.materials import Material
+from cutsim.tools import Shape
+
+DOCS = Path(__file__).parents[1] / "docs"
+PYTHON = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+def run_page(name):
+    """Run the Python of a page as one script and return its names."""
+    blocks = PYTHON.findall((DOCS / f"{name}.md").read_text(encoding="utf-8"))
+    assert blocks, f"{name}.md has no Python"
+    names = {"__name__": "__main__"}
+    exec(compile("\n".join(blocks), f"{name}.md", "exec"), names)
+    return names
+
+
+@pytest.fixture(scope="module")
+def material():
+    return run_page("adding_a_material")["material"]
+
+
+@pytest.fixture(scope="module")
+def law():
+    return run_page("adding_a_cohesive_law")["law"]
+
+
+@pytest.fixture(scope="module")
+def shape():
+    return run_page("adding_a_tool")["shape"]
+
+
+def test_user_guide(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    history = run_page("user_guide")["history"]
+    force = history["cylinder_force_y"]
+    np.testing.assert_allclose(force, history["plate_force"], rtol=1e-6)
+    assert 0 < force.argmax() < len(force) - 1, "the page says that the force peaks"
+    assert history["crack_broken"][-1] > 0
+    assert {path.name for path in (tmp_path / "results").iterdir()} >= {"history.csv", "displacement.bp", "force.png"}
+
+
+# -- material ---------------------------------------------------------------------------------------------------------
+
+
+def test_material_follows_hooke_and_is_objective(material):
+    assert isinstance(material, Material)
+    test_materials.test_reference_is_free_of_energy_and_stress(material)
+    test_materials.test_small_strains_follow_hooke(material)
+    test_materials.test_energy_is_objective(material, 2.0)
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_tangent_of_material(material, gdim):
+    b = make_blocks(gdim)
+    test_tangents.assert_slope_two(b.solid(material), b.state, test_tangents.smooth(b.state.V, 1, 0.2), 1.0)
+
+
+# -- cohesive law -----------------------------------------------------------------------------------------------------
+
+
+def test_law_peaks_and_spends_its_toughness(law):
+    assert isinstance(law, CohesiveLaw)
+    assert law.final == pytest.approx(0.4)
+    x = np.linspace(0, 1, 2001)[1:]
+    traction = [float(law.stiffness(d, 0.0, law.demand(d, 0.0))[0]) * d for d in x * law.final]
+    np.testing.assert_allclose(traction, 27 / 4 * law.t * x * (1 - x) ** 2, atol=1e-6)
+    assert max(traction) == pytest.approx(law.strength, rel=1e-5)
+    assert np.trapezoid([0, *traction], [0, *x * law.final]) == pytest.approx(law.toughness[0], rel=1e-4)
+
+
+@pytest.mark.parametrize("end", [(0.0, 0.5), (0.5, 0.0), (0.4, 0.3)], ids=["opening", "sliding", "mixed"])
+def test_law_in_a_crack(law, end):
+    """Broken, unloaded half way and reloaded, the finite-element crack has dissipated the toughness."""
+    path = np.array([(0, 0), np.multiply(end, 0.5), np.multiply(end, 0.1), end])
+    rows, _ = test_crack.drag(law, path, steps=40)
+    assert rows["energy_fracture"][-1] == pytest.approx(law.toughness[0], rel=1e-3)
+    assert rows["crack_broken"][-1] == pytest.approx(1.0)
+    assert np.diff(rows["energy_fracture"]).min() > -1e-12
+
+
+@pytest.mark.parametrize("jump", ["opening", "sliding", "mixed", "softening", "compression"])
+def test_tangent_of_law(law, jump):
+    sliding, opening, _ = test_tangents.JUMPS[jump]
+    scale = law.opening
+    b = make_blocks()
+    crack = b.crack(law, contact=PenaltyContact(30.0))
+    u = test_tangents.separated(b, sliding * scale, opening * scale, 0.01 * scale)
+    test_tangents.assert_slope_two(crack, b.state, u, scale)
+
+
+# -- tool -------------------------------------------------------------------------------------------------------------
+
+
+def test_distance_of_cone(shape):
+    """Along the axis and square to the surface; the gradient has length 1 everywhere."""
+    assert isinstance(shape, Shape)
+    s, c, r = np.sin(shape.half_angle), np.cos(shape.half_angle), shape.tip_radius
+    turn, along = np.random.default_rng(0).uniform(0, 6, (2, 40))
+    round_axis = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    normal = c * round_axis - [0, 0, s]
+    core = along[:, None] * (s * round_axis + [0, 0, c]) + [0, 0, r]
+    height = np.random.default_rng(1).uniform(0.1, 1.0, 40)
+    distance, gradient = test_tools.values(shape, core + height[:, None] * normal)
+    np.testing.assert_allclose(distance, height - r, atol=1e-8)
+    np.testing.assert_allclose(gradient, normal, atol=1e-6)
+    below, straight = test_tools.values(shape, [(0.0, 0.0, -0.5)])
+    assert below[0] == pytest.approx(0.5)
+    np.testing.assert_allclose(straight[0], (0, 0, -1), atol=1e-6)
+
+
+@pytest.mark.parametrize("friction", [None, test_tangents.FRICTION], ids=["smooth", "rough"])
+def test_tangent_of_cone(shape, friction):
+    b = make_blocks(3)
+    surface = Surface(b.state.measures.exterior(b.face(2, 1.0)))
+    tool = test_tangents.touch(b, shape, (0.4, 0.5, 0.9), [surface], friction)
+    test_tangents.assert_slope_two(tool, b.state, test_tangents.smooth(b.state.V, 4, 0.02), 0.05)
