@@ -11,6 +11,8 @@ import ufl
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
+from cutsim.checks import require
+
 
 class Measures:
     """Hands out measures over cells, exterior facets and interior facets.
@@ -33,7 +35,11 @@ class Measures:
         return self._add("dx", chosen[chosen < owned])
 
     def exterior(self, facets: Iterable[int]) -> ufl.Measure:
-        """Measure over local exterior facets; facets of ghost cells are left out."""
+        """Measure over local exterior facets; facets of ghost cells are left out. Collective.
+
+        Raises:
+            ValueError: There is none on any rank.
+        """
         owned = self.mesh.topology.index_map(self._tdim).size_local
         to_cells = self.mesh.topology.connectivity(self._tdim - 1, self._tdim)
         to_facets = self.mesh.topology.connectivity(self._tdim, self._tdim - 1)
@@ -42,6 +48,8 @@ class Measures:
             cells = to_cells.links(facet)
             if len(cells) == 1 and cells[0] < owned:
                 pairs.append((cells[0], int(np.flatnonzero(to_facets.links(cells[0]) == facet)[0])))
+        found = self.mesh.comm.allreduce(len(pairs))
+        require("facets", found, found > 0, "at least one exterior facet")
         return self._add("ds", np.asarray(pairs))
 
     def interior(self, entities: NDArray[np.int32]) -> ufl.Measure:

@@ -259,7 +259,7 @@ def test_refuses_a_time_in_the_past():
 
 def test_refuses_ambiguous_names():
     b = make_blocks()
-    with pytest.raises(ValueError, match="names = .* is not allowed"):
+    with pytest.raises(ValueError, match=r"names = .* is not allowed"):
         Mechanics(b.state, [b.solid(), b.solid()])
     with pytest.raises(ValueError, match="terms = 0 is not allowed"):
         Mechanics(b.state, [])

@@ -1,0 +1,35 @@
+"""Imports flow one way: from what steps and writes down to pure mathematics."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import cutsim
+
+SOURCES = Path(cutsim.__file__).parent
+# a module imports from its own layer and those before it
+LAYERS = [
+    {"checks", "kinematics", "measures", "compat", "assembly", "options", "sizes", "units"},
+    {"materials", "cohesive", "contact", "tools", "meshing", "space"},
+    {"state", "terms", "preconditioners", "tangent"},
+    {"interface", "solid", "loads", "solver"},
+    {"tool_contact", "energy"},
+    {"mechanics"},
+    {"stepping", "fracture"},
+]
+
+
+def imports(path):
+    """Modules of the package that a module imports."""
+    nodes = ast.walk(ast.parse(path.read_text()))
+    names = {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
+    return {name.split(".")[1] for name in names if name.startswith("cutsim.")}
+
+
+@pytest.mark.parametrize("height", range(len(LAYERS)))
+def test_imports_flow_one_way(height):
+    allowed = set().union(*LAYERS[: height + 1])
+    for module in LAYERS[height]:
+        strangers = imports(SOURCES / f"{module}.py") - allowed
+        assert not strangers, f"{module} imports {', '.join(sorted(strangers))}"

@@ -1,0 +1,182 @@
+"""Newton's order, augmented contact, and the same history on any number of ranks."""
+
+import numpy as np
+import pytest
+import ufl
+from conftest import NU, E, history, make_blocks
+from dolfinx import mesh
+from mpi4py import MPI
+
+from cutsim.assembly import integrate
+from cutsim.cohesive import Exponential
+from cutsim.compat import form
+from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.interface import Crack, Surface
+from cutsim.loads import Support, Traction
+from cutsim.materials import NeoHookean
+from cutsim.mechanics import Mechanics
+from cutsim.recording import Recording
+from cutsim.stepping import StepControl, run
+from cutsim.tool_contact import ToolContact
+from cutsim.tools import Ball, Path
+
+WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
+
+
+def pried_and_pressed(comm=MPI.COMM_WORLD, n=6, gdim=2, **options):
+    """A glued block, pulled at one edge until the crack softens, while a ball is pressed into its top."""
+    b = make_blocks(gdim, n, comm)
+    up = gdim - 1
+    start = np.append(np.full(gdim - 1, 0.25), 1.32)
+    path = Path.polyline([0, 1], [start, start - 0.15 * np.eye(gdim)[up] + 0.05 * np.eye(gdim)[0]])
+    surface = Surface(b.state.measures.exterior(b.face(up, 1.0)))
+    contact, friction = PenaltyContact(40.0, 0.02), Coulomb(0.2, 5e-3)
+    ball = ToolContact(b.state, Ball(0.3), path, [surface], contact=contact, friction=friction, name="ball")
+    supports = [Support(b.state, b.face(up, 0.0), i) for i in range(gdim)]
+    edge = mesh.locate_entities_boundary(b.state.mesh, gdim - 1, lambda x: np.isclose(x[0], 1) & (x[up] > 0.5 - 1e-9))
+    supports.append(Support(b.state, edge, up, lambda t: 0.5 * t, name="pull"))
+    terms = [b.solid(NeoHookean(E, NU)), b.crack(WEAK, contact=PenaltyContact(30.0)), ball]
+    return Mechanics(b.state, terms, supports, **options)
+
+
+def test_newton_converges_quadratically():
+    """As in table 4.7 of the thesis, on a problem with large strain, softening, contact and friction."""
+    options = {"ksp_type": "preonly", "pc_type": "lu"}
+    mechanics = pried_and_pressed(petsc_options=options, rtol=1e-14)
+    orders = []
+    for time in np.linspace(0.2, 1.0, 5):
+        mechanics.begin(time)
+        outcome = mechanics.solve("basic")
+        assert outcome.converged
+        mechanics.evaluate()
+        mechanics.commit()
+        r = np.array(outcome.residuals)
+        r = r[r > 5e-15]  # the rest is rounding
+        print(f"t = {time:.1f}:", *(f"{v:.2e}" for v in outcome.residuals))
+        orders.append(np.log(r[-1] / r[-2]) / np.log(r[-2] / r[-3]))
+    assert mechanics.record()["crack_broken"][0] > 0.1
+    assert np.median(orders) >= 1.9, orders
+
+
+# -- augmented contact ------------------------------------------------------------------------------------------------
+
+
+def pressed(penetration, stiffness=20.0):
+    """Two soft blocks without any bond, pressed together by 10 % and pulled apart again."""
+    b = make_blocks()
+    times, values = [0, 1, 2, 3], [0.0, -0.1, 0.0, 0.1]
+    supports = [Support(b.state, b.face(1, 0.0), 1)]
+    supports.append(Support(b.state, b.face(0, 0.0), 0))
+    supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: np.interp(t, times, values)))
+    crack = b.crack(None, contact=PenaltyContact(stiffness), penetration=penetration)
+    return Mechanics(b.state, [b.solid(NeoHookean(E, NU)), crack], supports), crack
+
+
+def test_augmentation_keeps_penetration_below_what_is_allowed():
+    allowed = 1e-5
+    mechanics, crack = pressed(allowed)
+    run(mechanics, 1.0, StepControl.fixed(0.25))
+    assert np.abs(crack.point_values("opening")).max() <= 1.01 * allowed
+    augmented = crack.point_values("pressure").mean()
+    # the pressure is that of blocks that do not penetrate: a stiff penalty comes near it, the soft one does not
+    stiff, soft = (pressed(None, k) for k in (2e4, 20.0))
+    pressures = []
+    for problem, other in (stiff, soft):
+        run(problem, 1.0, StepControl.fixed(0.25))
+        pressures.append(other.point_values("pressure").mean())
+    assert augmented == pytest.approx(pressures[0], rel=1e-3)
+    assert pressures[1] < 0.95 * augmented
+
+
+def test_multipliers_let_go_when_the_crack_opens_again():
+    """Nothing of the pressure is left on a gap: relieved, the contact closes exactly; pulled, it is free."""
+    mechanics, crack = pressed(1e-5)
+    run(mechanics, 1.5, StepControl.fixed(0.25))
+    assert np.abs(crack.point_values("opening")).max() <= 1.01e-5
+    run(mechanics, 3.0, StepControl.fixed(0.25))
+    assert crack.point_values("opening").min() > 0.09
+    assert not crack.point_values("pressure").any()
+
+
+def test_contact_that_does_not_settle_is_refused():
+    mechanics, _ = pressed(1e-14, 1e-2)
+    mechanics.begin(0.5)
+    outcome = mechanics.solve()
+    assert not outcome.converged
+    assert "augmentations" in outcome.message
+
+
+# -- ranks ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_history_does_not_depend_on_the_number_of_ranks(gdim):
+    """With a fixed schedule of steps; every column, relative to its largest value."""
+    n, step = (6, 0.1) if gdim == 2 else (4, 0.25)
+    together = history(pried_and_pressed(n=n, gdim=gdim, rtol=1e-11), 1.0, StepControl.fixed(step))
+    alone = history(pried_and_pressed(MPI.COMM_SELF, n, gdim, rtol=1e-11), 1.0, StepControl.fixed(step))
+    assert together["crack_broken"][-1] > 0.05
+    for name, values in alone.items():
+        # the closure is a small difference of energies: relative to them
+        scale = 1.0 if name == "energy_closure" else max(np.abs(values).max(), 1e-6)
+        np.testing.assert_allclose(together[name], values, atol=1e-7 * scale, err_msg=name)
+
+
+@pytest.mark.mpi
+def test_crack_has_one_plus_side():
+    """∫ n⁺·e dΓ is the whole area, with the sign of the side named '+', by region or by direction."""
+    b = make_blocks(3, 4)
+    N = ufl.FacetNormal(b.state.mesh)
+    for plus, sign in ((b.lower, 1), (b.upper, -1), ((0.0, 0.0, 1.0), 1), ((0.0, 0.1, -1.0), -1)):
+        crack = Crack(b.state, b.facets, plus, young=E)
+        assert integrate(form(N("+")[2] * crack.dS)) == pytest.approx(sign)
+
+
+@pytest.mark.mpi
+def test_recording_is_the_same_on_all_ranks(tmp_path):
+    comm = MPI.COMM_WORLD
+    folder = comm.bcast(tmp_path)
+    mechanics = pried_and_pressed()
+    with Recording(folder, mechanics, 0.4, every=2) as record:
+        run(mechanics, 0.4, StepControl.fixed(0.1), record)
+    assert all(h == record.history for h in comm.allgather(record.history))
+    np.testing.assert_allclose(record.column("time"), [0.1, 0.2, 0.3, 0.4])
+    comm.barrier()
+    assert (folder / "history.csv").exists()
+    with pytest.raises(ValueError, match=r"column = 'nonsense' is not allowed"):
+        record.column("nonsense")
+
+
+# -- supports and loads -----------------------------------------------------------------------------------------------
+
+
+def test_reactions_balance_a_dead_load():
+    b = make_blocks(3)
+    supports = [Support(b.state, b.face(2, 0.0), i, name=f"base_{'xyz'[i]}") for i in range(3)]
+    load = Traction(b.state, b.face(2, 1.0), (1e-3, 2e-3, -3e-3), lambda t: 2 * t)
+    mechanics = Mechanics(b.state, [b.solid(), b.crack(WEAK), load], supports, rtol=1e-10)
+    rows = history(mechanics, 1.0, StepControl.fixed(0.5))
+    for axis, traction in zip("xyz", (1e-3, 2e-3, -3e-3), strict=True):
+        assert rows[f"load_force_{axis}"][-1] == pytest.approx(2 * traction)
+        assert rows[f"base_{axis}_force"][-1] == pytest.approx(-2 * traction, rel=1e-6)
+    np.testing.assert_allclose(rows["energy_closure"], 0, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [
+        (lambda b: Support(b.state, b.face(1, 0.0), 2), "component"),
+        (lambda b: Support(b.state, b.face(1, 7.0), 0), "entities"),
+        (lambda b: Traction(b.state, b.face(1, 1.0), (1.0,), lambda t: t), "direction"),
+        (lambda b: Traction(b.state, b.face(1, 7.0), (1.0, 0.0), lambda t: t), "facets"),
+        (lambda b: b.crack(young=0.0), "young"),
+        (lambda b: b.crack(normal="mean"), "normal"),
+        (lambda b: b.crack(penetration=0.0), "penetration"),
+        (lambda b: b.crack(closing_range=-1.0), "closing_range"),
+        (lambda b: b.crack().point_values("nonsense"), "name"),
+    ],
+)
+def test_refuses_bad_parameters(make, name):
+    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+        make(make_blocks())
