@@ -120,7 +120,10 @@ def test_run_goes_on_after_failures():
         assert again.solve("basic").converged
         again.evaluate()
         again.commit()
-    assert snapshot(failing) == snapshot(again)
+    # what is kept of a factorisation differs, so the iterates do, within the tolerance of the solver
+    scale = max(abs(v) for v, _ in again.record().values())
+    for name, (value, _) in again.record().items():
+        assert failing.record()[name][0] == pytest.approx(value, abs=1e-6 * scale), name
 
 
 def test_another_line_search_saves_the_step():
@@ -158,7 +161,7 @@ def test_limit_on_damage_makes_steps_smaller():
     commit = crack.commit
     crack.commit = lambda: (growth.append(crack.damage_increment()), commit())
     run(mechanics, 0.6, StepControl(0.05, 0.05, damage=0.05), limited.append)
-    assert max(growth) <= 0.05 < 1.2 * max(growth) + 0.02
+    assert 0.02 < max(growth) <= 0.05
     assert sum(r.cuts for r in limited) > 0 == sum(r.cuts for r in free)
     assert crack.record()["crack_broken"][0] > 0.9
 

@@ -93,6 +93,9 @@ def test_friction_dissipates_mu_p_times_the_slip():
     assert dissipated[-1] == pytest.approx(0.3 * pressure * 1.5, rel=0.03)
     assert (np.diff(dissipated) > -1e-12).all()
     assert np.abs(rows["energy_closure"]).max() < 1e-2
+    assert rows["work_external"][-1] - rows["energy_contact"][-1] > 0.9 * dissipated[-1], (
+        "nothing else takes up the work"
+    )
 
 
 def test_tool_without_contact_does_nothing():
