@@ -16,7 +16,7 @@ from cutsim.kinematics import Expr
 from cutsim.mechanics import Mechanics
 from cutsim.output import FieldWriter, HistoryWriter
 from cutsim.progress import Progress
-from cutsim.stepping import StepReport
+from cutsim.stepping import StepError, StepReport
 from cutsim.units import Units
 
 Columns = dict[str, tuple[float, str]]
@@ -28,8 +28,8 @@ CRACK_FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
 class Recording:
     """Recorder of a run: pass it to `cutsim.stepping.run`. Use it as a context manager; collective.
 
-    Writes ``history.csv`` row by row and, every few steps, ``displacement.bp``, ``fields.bp`` and a file for each
-    crack, and shows progress.
+    Writes ``history.csv`` row by row and, every few steps and after the last, also if the run fails or is stopped,
+    ``displacement.bp``, ``fields.bp`` and a file for each crack, and shows progress.
 
     Args:
         folder: Where the files go.
@@ -68,6 +68,7 @@ class Recording:
         self._cracks = [_CrackFields(t) for t in mechanics.terms if isinstance(t, Crack) and t.law is not None]
         comm, start = mechanics.state.mesh.comm, mechanics.state.time_old
         self._progress = self._stack.enter_context(Progress(until, comm, title, start=start))
+        self._unwritten: float | None = None
         self._fields: FieldWriter | None = None
         if every:
             surfaces = {c.crack.name: c.functions for c in self._cracks}
@@ -91,11 +92,13 @@ class Recording:
         self._table.append(row)
         shown = {label: row[column] for label, column in self._show.items()}
         self._progress.update(report.time, step=report.number, **shown, iterations=report.outcome.iterations)
+        self._unwritten = report.time
         if self._every and report.number % self._every == 0:
             self.write_fields(report.time)
 
     def write_fields(self, time: float) -> None:
         """Write the fields of the present state. Collective."""
+        self._unwritten = None
         for crack in self._cracks:
             crack.update()
         if self._fields is not None:
@@ -116,6 +119,9 @@ class Recording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        # only these ends are known to be met by all ranks
+        if self._unwritten is not None and (kind is None or issubclass(kind, StepError)):
+            self.write_fields(self._unwritten)
         self._stack.close()
 
 

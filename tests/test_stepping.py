@@ -147,6 +147,7 @@ def test_smallest_step_is_named_and_history_is_kept(tmp_path):
         assert word in message
     rows = read_history(tmp_path / "history.csv")
     assert rows["time"][-1] == pytest.approx(mechanics.state.time_old)
+    assert (tmp_path / "displacement.bp").exists()
     assert rows["top_force"][-1] == pytest.approx(record.history["top_force"][-1])
     assert mechanics.state.time == mechanics.state.time_old == pytest.approx(0.34, abs=0.02)
     assert mechanics.terms[0].diagnose() is None, "the state is the last good one"
