@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from types import TracebackType
 from typing import Self
@@ -69,7 +70,7 @@ class Progress:
             self._print()
 
     def __enter__(self) -> Self:
-        if self._active and self._console.is_terminal:
+        if self._active and self._console.is_terminal and os.environ.get("TTY_COMPATIBLE") != "0":
             self._bar = Bar(
                 TextColumn("{task.description}"),
                 BarColumn(),
