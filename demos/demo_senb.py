@@ -184,10 +184,12 @@ class Bending:
     mechanics: Mechanics
 
     @classmethod
-    def build(cls, law: Exponential, parameters: dict[str, float], deflection: float) -> "Bending":
+    def build(
+        cls, law: Exponential, parameters: dict[str, float], deflection: float, comm: MPI.Comm = MPI.COMM_WORLD
+    ) -> "Bending":
         """Notch and ligament up to two millimetres below the load; `deflection` is reached at time 1."""
         dim = int(parameters["dim"])
-        domain = read_geo(MESH, MPI.COMM_WORLD, {"a": A, **parameters}, gdim=dim)
+        domain = read_geo(MESH, comm, {"a": A, **parameters}, gdim=dim)
         plane = facets_below(domain, W - 2.0)
         ligament = np.setdiff1d(plane, facets_below(domain, A))
         state = State(cracked_space(domain.mesh, ("Lagrange", 1, (dim,)), plane))
@@ -356,7 +358,16 @@ def draw(beam: Bending, recording: Recording, compliance: float, out: Path) -> N
     state = beam.solid.state
     grid = gather_grid(state.u, {"stress": axial_stress(beam.solid)})
     crack = gather_facets(state.u, beam.crack.facets, beam.crack.facet_mean("damage"))
-    draw_body(out / "beam.png", grid, "stress", label="axial stress [MPa]", title="Three-point bending", crack=crack)
+    draw_body(
+        out / "beam.png",
+        grid,
+        "stress",
+        label="axial stress [MPa]",
+        title="Three-point bending",
+        crack=crack,
+        mirror=("z",) if state.mesh.geometry.dim == 3 else (),
+        window=(-25.0, 25.0, 0.0, W, 0.0, 0.0),
+    )
     if MPI.COMM_WORLD.rank:
         return
     deflection = -recording.column("load_displacement")

@@ -1,0 +1,62 @@
+"""Three-point bending: the demo's beam against linear elastic fracture mechanics."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from cutsim.fracture import BentBeam
+from cutsim.meshing import read_geo
+from cutsim.output import read_history
+from cutsim.stepping import StepControl, run
+
+SCRIPT = Path(__file__).parent.parent / "demos" / "demo_senb.py"
+
+
+@pytest.fixture(scope="module")
+def demo():
+    spec = importlib.util.spec_from_file_location("demo_senb", SCRIPT)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ratio", [0.3, 0.45, 0.55])
+def test_stress_intensity_from_j_is_that_of_the_load(demo, ratio):
+    row = demo.fracture_parameters(ratio, demo.STATIONARY[2])
+    assert row["K_from_J"] == pytest.approx(row["K_closed_form"], rel=0.01)
+    assert row["J"] == pytest.approx([row["J"][1]] * 3, rel=1e-3)
+    assert row["G_from_energy"] == pytest.approx(row["J"][1], rel=2e-3)
+
+
+@pytest.mark.mpi
+def test_peak_and_branch_of_growing_crack(demo, tmp_path):
+    folder = MPI.COMM_WORLD.bcast(tmp_path, root=0)
+    domain = read_geo(demo.MESH, MPI.COMM_WORLD, {"a": demo.A, **demo.STATIONARY[2]}, gdim=2)
+    compliance = demo.DEFLECTION / demo.elastic(domain, demo.A).load
+    demo.propagation(2, True, folder, compliance)
+    history = read_history(folder / "history.csv")
+    deflection, load = -history["load_displacement"], history["load_per_thickness"]
+    # a bond of this strength gives way before a sharp crack would; then the load follows the sharp crack's branch
+    assert 0.8 < load.max() / BentBeam(demo.W, 1.0).critical_load(demo.TOUGHNESS, demo.A, demo.MODULUS) < 0.9
+    late = deflection > 0.75 * deflection[-1]
+    assert load[late] == pytest.approx(np.interp(deflection[late], *demo.limit_curve(compliance)), rel=0.03)
+    assert np.all(np.abs(history["energy_closure"]) < 0.01)
+    assert np.all(np.diff(history["energy_fracture"]) > -1e-12)
+    assert history["left_force"] == pytest.approx(history["right_force"], rel=1e-6)
+    assert history["left_force"] + history["right_force"] == pytest.approx(load, rel=1e-6)
+
+
+@pytest.mark.mpi
+def test_bending_is_the_same_on_any_number_of_ranks(demo):
+    parameters = {**demo.FINE, "lc": 0.25, "ahead": 2}
+    loads = []
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        beam = demo.Bending.build(demo.law_of(4.0), parameters, 0.009, comm)
+        with beam.mechanics.problem:
+            run(beam.mechanics, 1.0, StepControl.fixed(0.125), lambda r: loads.append(r.columns["load_force"][0]))
+    assert len(loads) == 16
+    assert loads[:8] == pytest.approx(loads[8:], rel=1e-7)
