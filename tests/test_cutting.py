@@ -1,0 +1,109 @@
+"""The blade cut: steady force against toughness, friction's share, balance with the support, rank independence."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
+from cutsim.cohesive import separation_curve
+from cutsim.cutting import BladeCut, recovered_toughness
+
+MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
+TOUGHNESS = 0.2
+
+
+def build(comm=MPI.COMM_WORLD, *, friction=0.0, viscosity=0.002, **parameters):
+    block = {"dim": 2, "Lx": 4.0, "H": 14.0, "lc": 0.05, "band": 0.3, "growth": 1.4, "notch": 0.5} | parameters
+    law = Exponential.from_parameters(strength=0.6, toughness=TOUGHNESS)
+    blade = Blade(np.radians(12), block["lc"], 0.855)
+    domain = read_geo(MESH, comm, block, gdim=2)
+    material = NeoHookean(0.777, 0.45)
+    return BladeCut.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=viscosity)
+
+
+def push(cut, depth, control):
+    rows = []
+    run(cut.mechanics, cut.time_of(depth), control, lambda r: rows.append(r.columns | cut.columns(r.columns)))
+    return {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
+
+
+@cache
+def steady():
+    cut = build()
+    return cut, push(cut, 9.0, StepControl(first=0.02, largest=0.1))
+
+
+def test_the_steady_force_per_width_is_the_toughness():
+    _, history = steady()
+    depth, force = history["depth"], history["force"]
+    late = depth > 5.0
+    mean = np.trapezoid(force[late], depth[late]) / np.ptp(depth[late])
+    assert depth[-1] - depth[0] > 8.0
+    assert mean == pytest.approx(TOUGHNESS, rel=0.02)
+    assert np.ptp(force[late]) < 0.05 * mean
+
+
+def test_the_balance_of_work_recovers_the_toughness():
+    cut, history = steady()
+    assert recovered_toughness(history, 3.0, 8.5, cut.whole) == pytest.approx(TOUGHNESS, rel=0.005)
+    with pytest.raises(ValueError, match="depths = .* such that the cut grows"):
+        recovered_toughness(history, 5.0, 5.0, cut.whole)
+
+
+def test_every_row_balances():
+    _, history = steady()
+    assert np.abs(history["energy_closure"]).max() < 0.01
+    assert history["imbalance"].max() < 1e-6
+    assert np.abs(history["blade_right_force_x"] + history["blade_left_force_x"]).max() < 1e-3 * history["force"].max()
+
+
+def test_dissipation_never_decreases():
+    _, history = steady()
+    for name in ("fracture", "viscous"):
+        assert np.diff(history[f"energy_{name}"]).min() > -1e-9 * history["work_external"].max()
+
+
+def test_friction_raises_the_force_by_its_own_work():
+    coarse = {"lc": 0.1, "H": 6.0}
+    smooth = push(build(**coarse), 1.6, StepControl(first=0.02, largest=0.1))
+    rough = push(build(friction=0.1, **coarse), 1.6, StepControl(first=0.02, largest=0.05))
+    assert np.abs(rough["energy_closure"]).max() < 0.01
+    assert np.diff(rough["energy_friction"]).min() > 0
+    extra = np.interp(1.6, rough["depth"], rough["work_external"]) - np.interp(
+        1.6, smooth["depth"], smooth["work_external"]
+    )
+    # the force of friction also presses the flanks harder: most of the extra work, not all of it, is friction
+    assert 0.6 * extra < rough["energy_friction"][-1] < extra
+
+
+@pytest.mark.mpi
+def test_every_number_of_ranks_gives_the_same_history():
+    coarse = {"lc": 0.1, "H": 3.0, "Lx": 3.0}
+    together = push(build(friction=0.1, **coarse), 0.7, StepControl.fixed(0.1))
+    alone = push(build(MPI.COMM_SELF, friction=0.1, **coarse), 0.7, StepControl.fixed(0.1))
+    for name in ("force", "crack_opening", "cut", "energy_strain", "energy_friction", "work_external"):
+        scale = np.abs(alone[name]).max()
+        assert np.abs(together[name] - alone[name]).max() <= 1e-7 * scale, name
+
+
+def test_separation_of_the_exponential_law_is_its_closed_form():
+    law = Exponential.from_parameters(strength=0.6, toughness=0.8)
+    opening, fraction = separation_curve(law)
+    x = opening / law.opening
+    np.testing.assert_allclose(fraction, 1 - (1 + x) * np.exp(-x), atol=1e-4)
+    assert fraction[-1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_parameters_are_refused_by_name():
+    law = Exponential.from_parameters(strength=0.6, toughness=0.2)
+    domain = read_geo(MESH, MPI.COMM_WORLD, {"dim": 2, "lc": 0.5}, gdim=2)
+    blade = Blade(0.2, 0.05, 0.855)
+    for wrong in ({"notch": 0.01}, {"notch": 0.5, "friction": -0.1}, {"notch": 0.5, "insertion": 0.0}):
+        with pytest.raises(ValueError, match=f"{list(wrong)[-1]} = "):
+            BladeCut.build(domain, NeoHookean(0.777, 0.45), law, blade, **wrong)
+    cut = build(lc=0.25, H=3.0)
+    with pytest.raises(ValueError, match="depth = 0.1"):
+        cut.time_of(0.1)
