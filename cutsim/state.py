@@ -31,6 +31,7 @@ class State:
         self.measures = Measures(V.mesh)
         self.time = 0.0
         self.time_old = 0.0
+        self._dt_old = float(self.dt.value)
 
     def begin(self, time: float) -> None:
         """Start a step that ends at `time`; the trial displacement starts from the committed one."""
@@ -41,11 +42,13 @@ class State:
         """Restore the committed displacement and time bit for bit."""
         self.u.x.array[:] = self.u_old.x.array
         self.time = self.time_old
+        self.dt.value = self._dt_old
 
     def commit(self) -> None:
         """Adopt the trial displacement and time."""
         self.u_old.x.array[:] = self.u.x.array
         self.time_old = self.time
+        self._dt_old = float(self.dt.value)
 
     @property
     def increment(self) -> np.ndarray:
