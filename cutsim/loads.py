@@ -11,6 +11,7 @@ from cutsim.assembly import global_dot, nodal_forces, resultant
 from cutsim.checks import require
 from cutsim.compat import form
 from cutsim.kinematics import Expr
+from cutsim.space import locate_dofs
 from cutsim.state import State
 from cutsim.terms import Term
 
@@ -19,6 +20,8 @@ History = Callable[[float], float]
 
 class Support:
     """Prescribed displacement of one component on some facets (or vertices), with its reaction.
+
+    On a crack it holds all its sides.
 
     Args:
         state: Displacement and time.
@@ -47,17 +50,15 @@ class Support:
         gdim = state.mesh.geometry.dim
         require("component", component, component in range(gdim), f"0 … {gdim - 1}")
         dim = state.mesh.topology.dim - 1 if dim is None else dim
-        state.mesh.topology.create_connectivity(dim, state.mesh.topology.dim)
         self.name, self.state, self.component, self.corners = name, state, component, corners
-        V = state.V.sub(component)
-        dofs = fem.locate_dofs_topological(V, dim, np.unique(np.asarray(entities, dtype=np.int32)))
+        dofs = gdim * locate_dofs(state.V, dim, entities) + component
         owned = len(state.increment)
         self._dofs = dofs[dofs < owned]
         found = state.mesh.comm.allreduce(len(self._dofs))
         require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
         self._history: History = value if callable(value) else lambda _: float(value)
         self._value = fem.Constant(state.mesh, default_scalar_type(self._history(0.0)))
-        self.bc = fem.dirichletbc(self._value, dofs, V)
+        self.bc = fem.dirichletbc(self._value, dofs, state.V.sub(component))
 
     @property
     def displacement(self) -> float:

@@ -34,7 +34,8 @@ def cracked_space(mesh: Mesh, element: Any, facets: Facets) -> fem.FunctionSpace
 
     Everything of dolfinx that goes through cells sees both sides. What goes through a facet of the crack does
     not: ``locate_dofs_topological`` on crack facets finds the dofs of one side, and not always of the same.
-    On the outer boundary it finds all, also where the crack meets it.
+    On facets of the outer boundary it finds all, also where the crack meets it; on vertices and edges there it
+    does not. `locate_dofs` finds the dofs of every side on any entity.
 
     Args:
         mesh: The mesh; on several ranks with ghost mode ``shared_facet``.
@@ -98,6 +99,36 @@ def crack_measure_entities(
         first = _along(mesh, cracked, cells, np.asarray(plus, dtype=np.float64))
     rows = np.stack([cells, local_facets], axis=2)
     return np.where(first[:, None, None], rows, rows[:, ::-1]).ravel()
+
+
+def locate_dofs(V: fem.FunctionSpace, dim: int, entities: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Dofs on mesh entities, on every side of the cracks that meet there. Collective.
+
+    A vertex or edge at the mouth of a crack belongs to cells on both sides, of which ``locate_dofs_topological``
+    looks at one, and not the same one on any number of ranks.
+
+    Args:
+        V: The space, cracked or not.
+        dim: Dimension of the entities.
+        entities: Local entities, owned or ghosts. One may be given on any of the ranks that know it.
+
+    Returns:
+        Local dofs (blocks), ghosts included, ascending.
+
+    Raises:
+        ValueError: On all ranks, if an entity is out of range.
+    """
+    topology, dofmap = V.mesh.topology, V.dofmap
+    topology.create_entities(dim)
+    topology.create_connectivity(topology.dim, dim)
+    table = topology.connectivity(topology.dim, dim)
+    cell_entities = table.array.reshape(table.num_nodes, -1)
+    named = _marks(V.mesh.comm, topology.index_map(dim), np.asarray(entities, dtype=np.int32), "entities")
+    cells, local = np.nonzero(named[cell_entities])
+    closure = np.array([dofmap.dof_layout.entity_closure_dofs(dim, i) for i in range(cell_entities.shape[1])])
+    found = np.zeros(dofmap.index_map.size_local + dofmap.index_map.num_ghosts, dtype=np.int32)
+    found[dofmap.list[cells[:, None], closure[local]]] = 1
+    return np.flatnonzero(_sum_over_ranks(dofmap.index_map, found)).astype(np.int32)
 
 
 # --- the crack in the mesh ---

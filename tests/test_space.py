@@ -9,7 +9,7 @@ from dolfinx.fem.petsc import LinearProblem, assemble_matrix
 from dolfinx.io import VTXWriter
 from mpi4py import MPI
 
-from cutsim.space import crack_measure_entities, cracked_space
+from cutsim.space import crack_measure_entities, cracked_space, locate_dofs
 
 WORLD = MPI.COMM_WORLD
 TRIANGLE, QUADRILATERAL = mesh.CellType.triangle, mesh.CellType.quadrilateral
@@ -222,6 +222,32 @@ def test_boundary_dofs_are_found_on_both_sides_and_in_the_right_place(partition)
     expected = np.sort([*np.linspace(0, 1, 2 * INTERVALS + 1), 0.5])
     np.testing.assert_allclose(np.sort(x[:, 0]), expected, atol=1e-14)
     np.testing.assert_allclose(x[:, 1], 0, atol=1e-14)
+
+
+@pytest.mark.mpi
+@every_partition
+@pytest.mark.parametrize(
+    ("cell", "crack", "dim", "place", "expected"),
+    [
+        (TRIANGLE, "split", 0, (0.5, 0.0), 2),
+        (QUADRILATERAL, "split", 0, (0.5, 0.0), 2),
+        (QUADRILATERAL, "cross", 0, (0.5, 0.5), 4),
+        (TRIANGLE, "tee", 0, (0.5, 0.5), 3),
+        (TRIANGLE, "edge", 0, (0.5, 0.5), 1),
+        (HEXAHEDRON, "split", 1, (0.5, 0.0), 2 * (2 * INTERVALS + 1)),
+        (TETRAHEDRON, "split", 1, (0.5, 0.0), 2 * (2 * INTERVALS + 1)),
+    ],
+)
+def test_dofs_are_found_on_every_side(partition, cell, crack, dim, place, expected):
+    """Vertices and lines of the crack, named by a single rank."""
+    domain = box(cell, partition)
+    V = cracked_space(domain, ("Lagrange", 2, (domain.geometry.dim,)), facets_of(domain, CRACKS[crack][0]))
+    domain.topology.create_entities(dim)
+    entities = mesh.locate_entities(domain, dim, lambda x: np.isclose(x[0], place[0]) & np.isclose(x[1], place[1]))
+    entities = entities[entities < domain.topology.index_map(dim).size_local]
+    dofs = locate_dofs(V, dim, entities)
+    assert WORLD.allreduce(int(np.sum(dofs < V.dofmap.index_map.size_local))) == expected
+    np.testing.assert_allclose(V.tabulate_dof_coordinates()[dofs, :2] - place, 0, atol=1e-14)
 
 
 @pytest.mark.mpi
