@@ -8,7 +8,7 @@ from cutsim.measures import Measures
 
 
 class State:
-    """Displacement, time and step size, trial and committed (STYLE: two phases).
+    """Displacement, time and step size, trial and committed.
 
     Args:
         V: Vector space of the displacement, usually from `cutsim.space.cracked_space`.
