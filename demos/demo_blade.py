@@ -38,7 +38,8 @@ from mpi4py import MPI
 from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
 from cutsim.cutting import BladeCut, recovered_toughness
 from cutsim.output import interpolate, write_summary
-from cutsim.pictures import Curve, draw_body, gather_facets, gather_grid, plot_curves, plot_energy, prism
+from cutsim.pictures import draw_body, gather_facets, gather_grid, prism
+from cutsim.plots import Curve, plot_curves, plot_energy
 from cutsim.recording import Recording
 
 MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
@@ -102,7 +103,7 @@ def main(
         friction=friction,
         viscosity=VISCOSITY,
     )
-    control = StepControl(first=0.02, largest=0.05 if friction else 0.1, smallest=1e-4)
+    control = StepControl(first=0.02, largest=0.05 if friction else 0.1, smallest=1e-4, closure=2e-3)
     until = cut.time_of(depth)
     with Recording(
         out,
@@ -169,7 +170,9 @@ def draw(cut: BladeCut, history: dict[str, np.ndarray], law: Exponential, out: P
             title="Blade cutting of silicone",
             references=expected,
         )
-        plot_energy(out / "energy.png", history, x="time", xlabel="way of the tool [mm]")
+        whole = {n: v * cut.whole if n.startswith(("work", "energy")) else v for n, v in history.items()}
+        whole["energy_closure"] = history["energy_closure"]
+        plot_energy(out / "energy.png", whole, x="time", xlabel="way of the tool [mm]")
     u = cut.state.u
     von_mises = fem.Function(fem.functionspace(cut.state.mesh, ("DG", 0)))
     stress = ufl.dev(cut.solid.cauchy_stress(u))

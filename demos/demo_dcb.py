@@ -65,7 +65,8 @@ from cutsim import (
 from cutsim.compat import JIT_OPTIONS, jit_cache
 from cutsim.fracture import CantileverBeams, crack_length_correction, plane_modulus
 from cutsim.output import write_summary
-from cutsim.pictures import Curve, draw_body, gather_facets, gather_grid, plot_curves, plot_energy
+from cutsim.pictures import draw_body, gather_facets, gather_grid
+from cutsim.plots import Curve, plot_curves, plot_energy
 from cutsim.recording import Columns, Recording
 
 MESH = Path(__file__).parents[1] / "meshes" / "dcb.geo"

@@ -48,7 +48,8 @@ from cutsim.materials import LinearElastic
 from cutsim.mechanics import Mechanics
 from cutsim.meshing import TaggedMesh, read_geo
 from cutsim.output import write_summary
-from cutsim.pictures import Curve, draw_body, gather_facets, gather_grid, plot_curves, plot_energy
+from cutsim.pictures import draw_body, gather_facets, gather_grid
+from cutsim.plots import Curve, plot_curves, plot_energy
 from cutsim.recording import Recording
 from cutsim.solid import Solid
 from cutsim.space import cracked_space

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
 from cutsim.cohesive import separation_curve
+from cutsim.compat import CACHE_DIR
 from cutsim.cutting import BladeCut, recovered_toughness
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
@@ -95,6 +96,14 @@ def test_separation_of_the_exponential_law_is_its_closed_form():
     x = opening / law.opening
     np.testing.assert_allclose(fraction, 1 - (1 + x) * np.exp(-x), atol=1e-4)
     assert fraction[-1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_second_problem_compiles_nothing():
+    size = {"lc": 0.25, "H": 3.0}
+    build(**size)
+    kernels = set(CACHE_DIR.rglob("*.so"))
+    build(**size, friction=0.0, viscosity=0.005)
+    assert set(CACHE_DIR.rglob("*.so")) == kernels
 
 
 def test_parameters_are_refused_by_name():

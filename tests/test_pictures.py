@@ -11,8 +11,9 @@ import pyvista
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from cutsim import pictures
-from cutsim.pictures import Curve, draw_body, gather_facets, gather_grid, plot_curves, plot_energy
+from cutsim import pictures, plots
+from cutsim.pictures import draw_body, gather_facets, gather_grid
+from cutsim.plots import Curve, plot_curves, plot_energy
 from cutsim.space import cracked_space
 
 SHAPES = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
@@ -166,7 +167,7 @@ def test_curves_and_energy_are_plotted(tmp_path):
     for name in ("new/force.png", "energy.png"):
         pixels, filled = colours(tmp_path / name)
         assert pixels.shape[1] == 1050 and filled > 0.002
-    codes = [pictures.ENERGIES[name][1] for name in ("energy_strain", "energy_fracture")]
+    codes = [plots.ENERGIES[name][1] for name in ("energy_strain", "energy_fracture")]
     pixels = colours(tmp_path / "energy.png")[0]
     shown = [0.85 * np.array(matplotlib.colors.to_rgb(code)) + 0.15 for code in codes]
     shares = [np.mean(np.abs(pixels - colour).max(axis=2) < 0.02) for colour in shown]
