@@ -85,7 +85,8 @@ def main(
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/blade"),
 ) -> None:
     """Push a rigid wedge blade through silicone and recover the fracture energy from the force."""
-    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    level = logging.WARNING if MPI.COMM_WORLD.rank == 0 else logging.ERROR
+    logging.basicConfig(level=level, format="%(name)s: %(message)s")
     begun = time.perf_counter()
     parameters, radius, default_toughness, default_depth = SETTINGS[dim, quick]
     depth = depth or default_depth

@@ -351,7 +351,8 @@ def main(
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/dcb"),
 ) -> None:
     """Open a double cantilever beam and compare force and dissipation with beam theory."""
-    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    level = logging.WARNING if MPI.COMM_WORLD.rank == 0 else logging.ERROR
+    logging.basicConfig(level=level, format="%(name)s: %(message)s")
     specimen = (QUICK if quick else FULL)[case]
     if steps is not None:
         specimen = replace(specimen, step=specimen.turns[-1] / steps)

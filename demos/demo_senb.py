@@ -267,7 +267,8 @@ def main(
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/senb"),
 ) -> None:
     """Bend a notched beam: stress intensity below propagation, then the load through its peak."""
-    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    level = logging.WARNING if MPI.COMM_WORLD.rank == 0 else logging.ERROR
+    logging.basicConfig(level=level, format="%(name)s: %(message)s")
     summary: dict[str, Any] = {"dimension": int(dim), "notch": below_propagation(int(dim))}
     summary |= propagation(int(dim), quick, out, summary["notch"][-1])
     if dim == "2" and not quick:
