@@ -20,7 +20,7 @@
 # order of $\ell = E' G_c/t^2$.  Where $\ell \ll W$ the peak load approaches that of linear elastic fracture mechanics,
 # $$P_c = \frac{\sqrt{E' G_c}\, B\, W^{3/2}}{S f(a/W)}, \qquad
 #   \left(\frac{P_c}{P}\right)^2 = 1 + c\,\frac{\ell}{W} + \dots \quad\text{(Bažant's size effect)},$$
-# so that the parabola through $(P_c/P)^2$ of three strengths, drawn to $\ell = 0$, must end at 1.
+# so that the parabola through $(P_c/P)^2$ of three strengths, drawn to $\ell = 0$, ends near 1: within 2 % of the load.
 #
 # **The parameters.**  The thesis prints a strength of 2–2.5 MPa, an opening of 0.001 mm and $G_c$ = 28.3–50 N/mm.  The
 # first two imply $G_c = e\,t\,\varepsilon$ = 0.0068 N/mm, a four-thousandth of the third.  The demo takes 0.0068 N/mm,
