@@ -208,7 +208,8 @@ def test_plain_progress_ends_with_the_last_step():
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_progress_lets_errors_and_interrupts_pass(terminal):
+def test_progress_lets_errors_and_interrupts_pass(terminal, monkeypatch):
+    monkeypatch.delenv("TTY_COMPATIBLE", raising=False)
     for error in (ValueError, KeyboardInterrupt):
         console = Console(file=io.StringIO(), force_terminal=terminal, width=120)
 
