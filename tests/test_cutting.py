@@ -17,7 +17,7 @@ TOUGHNESS = 0.2
 
 
 def build(comm=MPI.COMM_WORLD, *, friction=0.0, viscosity=0.002, **parameters):
-    block = {"dim": 2, "Lx": 4.0, "H": 14.0, "lc": 0.05, "band": 0.3, "growth": 1.4, "notch": 0.5} | parameters
+    block = {"dim": 2, "Lx": 4.0, "H": 13.0, "lc": 0.05, "band": 0.3, "growth": 1.4, "notch": 0.5} | parameters
     law = Exponential.from_parameters(strength=0.6, toughness=TOUGHNESS)
     blade = Blade(np.radians(12), block["lc"], 0.855)
     domain = read_geo(MESH, comm, block, gdim=2)
@@ -34,7 +34,7 @@ def push(cut, depth, control):
 @cache
 def steady():
     cut = build()
-    return cut, push(cut, 9.0, StepControl(first=0.02, largest=0.1))
+    return cut, push(cut, 8.6, StepControl(first=0.02, largest=0.1))
 
 
 def test_the_steady_force_per_width_is_the_toughness():
