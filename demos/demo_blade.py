@@ -104,7 +104,7 @@ def main(
         friction=friction,
         viscosity=VISCOSITY,
     )
-    control = StepControl(first=0.02, largest=0.05 if friction else 0.1, smallest=1e-4, closure=2e-3)
+    control = StepControl(first=0.02, largest=0.05 if friction else 0.1, smallest=1e-4, closure=5e-3)
     until = cut.time_of(depth)
     with Recording(
         out,

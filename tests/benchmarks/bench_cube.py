@@ -43,7 +43,7 @@ def stretch(n: int) -> tuple[float, int, int, Usage]:
             outcomes = []
             for step in range(1, STEPS + 1):
                 lift.value[2] = LIFT * step / STEPS
-                outcomes.append(problem.solve())
+                outcomes.append(problem.solve("basic"))
                 if not outcomes[-1].converged:
                     raise RuntimeError(f"n = {n}, step {step}: {outcomes[-1].message}")
         reactions = problem.reactions().array.reshape(-1, 3)
