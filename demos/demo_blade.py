@@ -184,7 +184,7 @@ def draw(cut: BladeCut, history: dict[str, np.ndarray], law: Exponential, out: P
     tip = np.where(np.arange(dim) == 1, tip, 0.0)
     edge = None if dim == 2 else (0.0, 0.0, WIDTH)
     start = tip if dim == 2 else tip - (0.0, 0.0, WIDTH / 2)
-    tool = prism(cut.blade.outline(HEIGHT), start, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), edge)
+    tool = prism(cut.blade.outline(max(HEIGHT, 1.0 - tip[1])), start, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), edge)
     draw_body(
         out / "cut.png",
         grid,
