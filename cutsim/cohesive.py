@@ -166,7 +166,7 @@ class Exponential:
         """Loss of strength in each pure mode after its peak (thesis 4.26, 4.27)."""
         phi_n, phi_t = self.toughness
         normal = kappa / self.eps_n
-        sliding = kappa / (sqrt(phi_t / phi_n) * self.eps_t)
+        sliding = kappa / (ufl.sqrt(phi_t / phi_n) * self.eps_t)
         D_n = 1 - normal * ufl.exp(1 - normal)
         D_t = 1 - sqrt(2) * sliding * ufl.exp(0.5 - sliding**2)
         return (

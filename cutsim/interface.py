@@ -23,6 +23,7 @@ from cutsim.cohesive import CohesiveLaw, process_zone_element
 from cutsim.compat import form
 from cutsim.contact import PenaltyContact
 from cutsim.kinematics import Expr, displacement_jump, midsurface_normal, safe_norm
+from cutsim.parameters import with_constants
 from cutsim.sizes import facet_size, normal_size
 from cutsim.space import crack_measure_entities
 from cutsim.state import State
@@ -131,8 +132,10 @@ class Crack(Term):
         self.size = self._mean(facet_size(state.mesh, self.facets))
         self.normal_size = self._mean(normal_size(state.mesh, self.facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
+        self._symbolic_law = None if law is None else with_constants(state.mesh, law)
+        self._symbolic_contact = with_constants(state.mesh, self.contact)
         floor = 3 * law.opening if law is not None else 0.0
-        self._range = closing_range or max(floor, self.size)
+        self._range = fem.Constant(state.mesh, default_scalar_type(closing_range or max(floor, self.size)))
         self._warn_coarse(young)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
         self._points_form = form(self._point_values(), entity_maps=self.entity_maps)
@@ -160,21 +163,22 @@ class Crack(Term):
         return ufl.inner(traction, displacement_jump(v)) * self.dS
 
     def _response(self, u: Expr) -> _Response:
+        law, contact = self._symbolic_law, self._symbolic_contact
         N = ufl.FacetNormal(self.state.mesh)
         n = midsurface_normal(u, N) if self._current else N("+")
         jump = displacement_jump(u)
         gap = ufl.dot(jump, n)
         slide = jump - gap * n
         opening = ufl.conditional(ufl.ge(gap, 0), gap, 0.0)
-        multiplier = self._multiplier("+") / self.contact.stiffness if self._allowed_penetration else 0.0
+        multiplier = self._multiplier("+") / contact.stiffness if self._allowed_penetration else 0.0
         fade = ufl.exp(-((ufl.dot(jump, jump) / self._range**2) ** 2))
-        pressure = fade * self.contact.pressure(multiplier - gap)
-        if self.law is None:
+        pressure = fade * contact.pressure(multiplier - gap)
+        if law is None:
             return _Response(jump, gap, safe_norm(slide, 1e-12), ufl.as_ufl(0.0), 0 * jump, pressure, n)
-        sliding = safe_norm(slide, 1e-12 * self.law.opening)
-        demand = self.law.demand(opening, sliding)
+        sliding = safe_norm(slide, 1e-12 * law.opening)
+        demand = law.demand(opening, sliding)
         kappa = self._history(demand)
-        k_n, k_t = self.law.stiffness(opening, sliding, kappa)
+        k_n, k_t = law.stiffness(opening, sliding, kappa)
         return _Response(jump, gap, sliding, demand, k_n * opening * n + k_t * slide, pressure, n)
 
     def _history(self, demand: Expr) -> Expr:
@@ -227,11 +231,8 @@ class Crack(Term):
         u_s = self.state.u_old + self._s * (self.state.u - self.state.u_old)
         r = self._response(u_s)
         increment = displacement_jump(self.state.u) - displacement_jump(self.state.u_old)
-        if self.law is None:
-            damage = ufl.as_ufl(1.0)
-        else:
-            kappa = self._history(r.demand)
-            damage = self.law.damage(kappa)[0]
+        law = self._symbolic_law
+        damage = ufl.as_ufl(1.0) if law is None else law.damage(self._history(r.demand))[0]
         columns = {
             "demand": r.demand,
             "cohesive_power": ufl.dot(r.cohesive, increment),

@@ -6,7 +6,7 @@ from typing import Literal
 import basix
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
@@ -15,6 +15,7 @@ from cutsim.checks import require
 from cutsim.compat import form
 from cutsim.kinematics import Expr, deformation_gradient, green_lagrange
 from cutsim.materials import Material
+from cutsim.parameters import with_constants
 from cutsim.state import State
 from cutsim.terms import Term
 
@@ -63,8 +64,10 @@ class Solid(Term):
         self.name = name
         self.state = state
         self.material = material
+        self._law = with_constants(state.mesh, material)
         self.plane = plane
         self.viscosity = viscosity
+        self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
         self.measures = self._choose_measures(volumetric)
         self._energy_form = form(self._stored(state.u))
@@ -74,12 +77,12 @@ class Solid(Term):
     def deformation_gradient(self, u: Expr) -> Expr:
         """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""
         F = deformation_gradient(u)
-        return deformation_gradient(u, self.material.plane_stress_stretch(F)) if self.plane == "stress" else F
+        return deformation_gradient(u, self._law.plane_stress_stretch(F)) if self.plane == "stress" else F
 
     def first_piola(self, u: Expr) -> Expr:
         """First Piola–Kirchhoff stress P = ∂W/∂F, 3 × 3 [stress]."""
         F = ufl.variable(self.deformation_gradient(u))
-        return ufl.diff(sum(self.material.energy(F)), F)
+        return ufl.diff(sum(self._law.energy(F)), F)
 
     def cauchy_stress(self, u: Expr) -> Expr:
         """Cauchy stress σ = P Fᵀ / J, 3 × 3 [stress]."""
@@ -88,7 +91,7 @@ class Solid(Term):
 
     def strain_energy_density(self, u: Expr) -> Expr:
         """Strain energy per reference volume W [energy/length³]."""
-        return sum(self.material.energy(self.deformation_gradient(u)))
+        return sum(self._law.energy(self.deformation_gradient(u)))
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of the elastic and viscous stresses."""
@@ -96,7 +99,7 @@ class Solid(Term):
         if self.viscosity:
             E = green_lagrange(deformation_gradient(self.state.u))
             rate = (E - green_lagrange(deformation_gradient(self.state.u_old))) / self.state.dt
-            work += self.viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
+            work += self._viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
         return work
 
     def evaluate(self) -> None:
@@ -156,10 +159,10 @@ class Solid(Term):
         return first, second
 
     def _stored(self, u: Expr) -> ufl.Form:
-        shear, volumetric = self.material.energy(self.deformation_gradient(u))
+        shear, volumetric = self._law.energy(self.deformation_gradient(u))
         dx, dx_volumetric = self.measures
         return shear * dx + volumetric * dx_volumetric
 
     def _viscous_work(self) -> ufl.Form:
         new, old = (green_lagrange(deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
-        return self.viscosity / self.state.dt * ufl.inner(new - old, new - old) * self.measures[0]
+        return self._viscosity / self.state.dt * ufl.inner(new - old, new - old) * self.measures[0]

@@ -14,6 +14,7 @@ from cutsim.compat import form
 from cutsim.contact import Coulomb, PenaltyContact
 from cutsim.interface import Surface
 from cutsim.kinematics import Expr, tangential
+from cutsim.parameters import with_constants
 from cutsim.state import State
 from cutsim.terms import Term
 from cutsim.tools import Path, Shape
@@ -56,12 +57,14 @@ class ToolContact(Term):
         require("path", start.shape, start.shape == (gdim,), f"positions of {gdim} components")
         self.name, self.state, self.shape, self.path = name, state, shape, path
         self.contact, self.friction = contact, friction
+        self._contact = with_constants(state.mesh, contact)
+        self._coulomb = None if friction is None else with_constants(state.mesh, friction)
         self.symmetric = friction is None
         self._surfaces = tuple(Surface(s.measure(metadata={"quadrature_degree": 4}), s.side) for s in surfaces)
         self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
         self.position_old = fem.Constant(state.mesh, start.astype(default_scalar_type))
         v = ufl.TestFunction(state.V)
-        self._energy_form = form(self._sum(lambda s: contact.energy(-self._distance(s))))
+        self._energy_form = form(self._sum(lambda s: self._contact.energy(-self._distance(s))))
         self._contact_form = form(self.residual(v))
         self._friction_form = (
             form(self._sum(lambda s: -ufl.dot(self._friction(s), s.restrict(v)))) if friction else None
@@ -166,12 +169,12 @@ class ToolContact(Term):
         return ufl.diff(self.shape.distance(x), x)
 
     def _pressure(self, surface: Surface) -> Expr:
-        return self.contact.pressure(-self._distance(surface))
+        return self._contact.pressure(-self._distance(surface))
 
     def _friction(self, surface: Surface) -> Expr:
-        assert self.friction is not None
+        assert self._coulomb is not None
         moved = surface.restrict(self.state.u - self.state.u_old) - (self.position - self.position_old)
-        return self.friction.traction(self._pressure(surface), tangential(moved, self._normal(surface)))
+        return self._coulomb.traction(self._pressure(surface), tangential(moved, self._normal(surface)))
 
 
 def warn_coarse(name: str, shape: Shape, facet_size: float) -> None:

@@ -10,7 +10,7 @@ import cutsim
 SOURCES = Path(cutsim.__file__).parent
 # a module imports from its own layer and those before it
 LAYERS = [
-    {"checks", "kinematics", "measures", "compat", "assembly", "options", "sizes", "units"},
+    {"checks", "kinematics", "measures", "compat", "assembly", "options", "parameters", "sizes", "units"},
     {"materials", "cohesive", "contact", "tools", "meshing", "space"},
     {"state", "terms", "preconditioners", "tangent"},
     {"interface", "solid", "loads", "solver"},

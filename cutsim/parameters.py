@@ -1,0 +1,29 @@
+"""Parameters of laws as form constants, so that another value needs no other kernel."""
+
+from copy import copy
+from dataclasses import fields
+from typing import Any, TypeVar
+
+from dolfinx import default_scalar_type, fem
+from dolfinx.mesh import Mesh
+
+Law = TypeVar("Law")
+
+
+def with_constants(mesh: Mesh, law: Law) -> Law:
+    """The law with each of its numbers replaced by a `dolfinx.fem.Constant` of the same value.
+
+    Kernels are then compiled for the law, not for the values of its parameters.  The copy is for writing forms only.
+
+    Args:
+        mesh: Mesh of the forms.
+        law: A dataclass of parameters.  What is not a number is kept, and so is zero, which switches a part of a law
+            off and thus changes its kernel.
+    """
+    symbolic: Any = copy(law)
+    for field in fields(law):  # type: ignore[arg-type]
+        value = getattr(law, field.name)
+        if isinstance(value, int | float) and not isinstance(value, bool) and value != 0:
+            # the dataclasses are frozen, and their checks are for numbers
+            object.__setattr__(symbolic, field.name, fem.Constant(mesh, default_scalar_type(value)))
+    return symbolic
