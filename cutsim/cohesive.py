@@ -1,4 +1,4 @@
-"""Cohesive laws: traction against displacement jump on a crack that is opening (THEORY §3.1, 3.2).
+"""Cohesive laws: traction against displacement jump on a crack that is opening (docs/theory.md §3.1, 3.2).
 
 A law gives *secant* stiffnesses: T = k_n ⟨δ_n⟩ n + k_t δ_t.  Its memory is one scalar per point, κ, the largest
 value of the law's own loading measure ("demand") so far.  Loading follows the envelope, unloading and

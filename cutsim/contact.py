@@ -1,4 +1,4 @@
-"""Contact laws: normal pressure against penetration, and friction on a rigid tool (THEORY §3, 3.3, 4)."""
+"""Contact laws: normal pressure against penetration, and friction on a rigid tool (docs/theory.md §3, 3.3, 4)."""
 
 from dataclasses import dataclass
 

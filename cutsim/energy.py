@@ -1,4 +1,4 @@
-"""The energy audit: external work against what became of it (THEORY §6)."""
+"""The energy audit: external work against what became of it (docs/theory.md §6)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace

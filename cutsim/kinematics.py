@@ -52,7 +52,7 @@ def cofactor(A: Expr) -> Expr:
 
 
 def midsurface_normal(u: Expr, N: Expr) -> Expr:
-    """Unit normal of the current mid-surface of a crack, from '+' to '−' (THEORY §1).
+    """Unit normal of the current mid-surface of a crack, from '+' to '−' (docs/theory.md §1).
 
     Nanson's formula with the mean of the two deformation gradients, n = cof(½(F⁺ + F⁻)) N⁺ / |…|.
 

@@ -1,4 +1,4 @@
-"""Bulk materials: strain energies per reference volume (THEORY §2).
+"""Bulk materials: strain energies per reference volume (docs/theory.md §2).
 
 A material is a frozen dataclass of parameters that returns its strain energy in two parts: the part to be
 integrated fully and the volumetric part, which may be integrated with fewer points so that low-order elements

@@ -1,4 +1,4 @@
-"""A deformable body: hyperelastic bulk with optional Kelvin–Voigt viscosity (THEORY §2)."""
+"""A deformable body: hyperelastic bulk with optional Kelvin–Voigt viscosity (docs/theory.md §2)."""
 
 import logging
 from typing import Literal

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from cutsim.kinematics import Expr
 
-#: Entries of the energy audit; the external work equals their sum (THEORY §6).
+#: Entries of the energy audit; the external work equals their sum (docs/theory.md §6).
 ENTRIES = ("strain", "cohesive_stored", "fracture", "friction", "contact", "viscous")
 
 

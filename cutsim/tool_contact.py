@@ -1,4 +1,4 @@
-"""A rigid tool pressed into the body: contact on outer surfaces and crack faces, friction, reactions (THEORY §4)."""
+"""A rigid tool in the body: contact on outer surfaces and crack faces, friction, reactions (docs/theory.md §4)."""
 
 import logging
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Rigid tools: smooth signed distances and prescribed paths (THEORY §4).
+"""Rigid tools: smooth signed distances and prescribed paths (docs/theory.md §4).
 
 A shape is a frozen dataclass with one method, `distance(x)`, for a position relative to the tool's reference point:
 negative inside, |∇d| = 1.  Rounded shapes are the set of points within the tip radius of a sharp core, so that a
