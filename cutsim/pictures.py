@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
+
 def gather_grid(
     u: fem.Function, cell_data: Mapping[str, NDArray[np.float64] | fem.Function] | None = None
 ) -> pyvista.UnstructuredGrid | None:

@@ -69,9 +69,7 @@ def cracked_space(mesh: Mesh, element: Any, facets: Facets) -> fem.FunctionSpace
     return fem.FunctionSpace(mesh, parent.ufl_element(), space)
 
 
-def crack_measure_entities(
-    mesh: Mesh, facets: Facets, plus: NDArray[np.int32] | Sequence[float]
-) -> NDArray[np.int32]:
+def crack_measure_entities(mesh: Mesh, facets: Facets, plus: NDArray[np.int32] | Sequence[float]) -> NDArray[np.int32]:
     """Integration data of the crack with a fixed '+' side. Collective.
 
     The sides that dolfinx gives interior facets follow the cell numbers and so change with the partition. Use
@@ -218,9 +216,7 @@ def _cells_of(mesh: Mesh, facets: NDArray[Any]) -> tuple[NDArray[np.int32], NDAr
     return pairs[0], pairs[1]
 
 
-def _in_region(
-    mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], plus: NDArray[np.int32]
-) -> NDArray[np.bool_]:
+def _in_region(mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], plus: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Whether the first cell of each facet is the one in the region."""
     inside = _marks(mesh.comm, mesh.topology.index_map(mesh.topology.dim), plus.ravel(), "plus")[cells]
     wrong = facets[inside[:, 0] == inside[:, 1]].astype(np.int32)
@@ -229,9 +225,7 @@ def _in_region(
     return inside[:, 0]
 
 
-def _along(
-    mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], direction: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def _along(mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], direction: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether the normal out of the first cell of each facet points along the direction."""
     tdim, gdim, facets = mesh.topology.dim, mesh.geometry.dim, facets.astype(np.int32)
     sound = direction.shape == (gdim,) and np.all(np.isfinite(direction)) and np.any(direction)
@@ -280,9 +274,7 @@ def _check_element(element: Any) -> None:
 def _incidence(mesh: Mesh, parent: fem.FunctionSpace, cracked: NDArray[np.bool_]) -> _Incidence:
     tdim, dofmap, index_map = mesh.topology.dim, parent.dofmap, parent.dofmap.index_map
     cell_dofs, cell_facets = dofmap.list, _cell_facets(mesh)
-    closure = np.array(
-        [dofmap.dof_layout.entity_closure_dofs(tdim - 1, i) for i in range(cell_facets.shape[1])]
-    )
+    closure = np.array([dofmap.dof_layout.entity_closure_dofs(tdim - 1, i) for i in range(cell_facets.shape[1])])
     cells, local = np.nonzero(cracked[cell_facets])
     on_crack = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     on_crack[cell_dofs[cells[:, None], closure[local]]] = 1
@@ -302,9 +294,7 @@ def _incidence(mesh: Mesh, parent: fem.FunctionSpace, cracked: NDArray[np.bool_]
     shared = cell_dofs[pairs[:, :1], closure[local_facets[:, 0]]]
     row, column = np.nonzero(marked[shared])
     links = np.stack([key(shared[row, column], pairs[row, side]) for side in (0, 1)], axis=1)
-    return _Incidence(
-        cells, places, key(cell_dofs[cells, places], cells), cells < cell_map.size_local, links, marked
-    )
+    return _Incidence(cells, places, key(cell_dofs[cells, places], cells), cells < cell_map.size_local, links, marked)
 
 
 def _copies(comm: MPI.Comm, incidence: _Incidence) -> _Copies:
@@ -343,9 +333,7 @@ def _split_dofs(
     return dofs, owners.astype(np.int32)
 
 
-def _renumber(
-    comm: MPI.Comm, dofs: NDArray[np.int64], owners: NDArray[np.int32]
-) -> tuple[IndexMap, NDArray[np.int32]]:
+def _renumber(comm: MPI.Comm, dofs: NDArray[np.int64], owners: NDArray[np.int32]) -> tuple[IndexMap, NDArray[np.int32]]:
     """Index map with the dofs that other ranks own as ghosts, and the dofs in local numbers."""
     here = owners == comm.rank
     start, end = (dofs[here].min(), dofs[here].max() + 1) if here.any() else (0, 0)

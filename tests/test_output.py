@@ -34,9 +34,7 @@ def folder(tmp_path):
 def body():
     """A square, torn open along its middle line: u_x = ±0.1 y, so F = I ± 0.1 e_x ⊗ e_y."""
     partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
-    square = mesh.create_unit_square(
-        MPI.COMM_WORLD, 4, 4, mesh.CellType.quadrilateral, partitioner=partitioner
-    )
+    square = mesh.create_unit_square(MPI.COMM_WORLD, 4, 4, mesh.CellType.quadrilateral, partitioner=partitioner)
     facets = mesh.locate_entities(square, 1, lambda x: np.isclose(x[0], 0.5))
     u = fem.Function(cracked_space(square, ("Lagrange", 1, (2,)), facets), name="u")
     for sign, half in ((-1, lambda x: x[0] < 0.5 + 1e-9), (1, lambda x: x[0] > 0.5 - 1e-9)):
@@ -191,9 +189,7 @@ def test_names_of_fields_are_checked(tmp_path, body):
 @pytest.mark.mpi
 def test_plain_progress_ends_with_the_last_step():
     text = io.StringIO()
-    with Progress(
-        2.0, MPI.COMM_WORLD, "cut", console=Console(file=text, width=200), interval=60.0
-    ) as progress:
+    with Progress(2.0, MPI.COMM_WORLD, "cut", console=Console(file=text, width=200), interval=60.0) as progress:
         for step in range(1, 5):
             progress.update(0.5 * step, step=step, force=np.pi, cuts=0)
     if MPI.COMM_WORLD.rank == 0:

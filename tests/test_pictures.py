@@ -47,9 +47,7 @@ def torn(shape, degree):
 @pytest.mark.parametrize("shape", SHAPES)
 def test_gathered_body_is_whole_and_torn(shape, degree):
     u, height, facets, damage = torn(shape, degree)
-    local = np.full(
-        u.function_space.mesh.topology.index_map(u.function_space.mesh.topology.dim).size_local, 7.0
-    )
+    local = np.full(u.function_space.mesh.topology.index_map(u.function_space.mesh.topology.dim).size_local, 7.0)
     grid = gather_grid(u, {"height": height, "seven": local})
     faces = gather_facets(u, facets, damage)
     if MPI.COMM_WORLD.rank > 0:
@@ -65,11 +63,7 @@ def test_gathered_body_is_whole_and_torn(shape, degree):
     assert set(grid["seven"]) == {7.0}
     torn_faces = faces.warp_by_vector("u")
     sides = torn_faces.cell_centers().points[:, 0]
-    assert (
-        np.count_nonzero(np.isclose(sides, 0.5))
-        == np.count_nonzero(np.isclose(sides, 0.75))
-        == len(sides) // 2
-    )
+    assert np.count_nonzero(np.isclose(sides, 0.5)) == np.count_nonzero(np.isclose(sides, 0.75)) == len(sides) // 2
     np.testing.assert_array_equal(sides > 0.6, faces["middle"][:, 0] > 0.5)
     sizes = faces.compute_cell_sizes()
     assert np.sum(sizes["Area" if measure == "Volume" else "Length"]) == pytest.approx(2.0)

@@ -194,9 +194,7 @@ def test_facets_and_cells_known_to_one_rank_are_enough(partition):
     (facets,) = facets_of(domain, [upright(0, 1)])
     facet_map, cell_map = domain.topology.index_map(1), domain.topology.index_map(2)
     elsewhere = facet_map.index_to_dest_ranks()
-    is_shared = np.array(
-        [f < facet_map.size_local and elsewhere.links(f).size > 0 for f in facets], dtype=bool
-    )
+    is_shared = np.array([f < facet_map.size_local and elsewhere.links(f).size > 0 for f in facets], dtype=bool)
     left, _ = sides(domain)
     whole = cracked_space(domain, ("Lagrange", 1), facets)
     entities = crack_measure_entities(domain, facets, left)
@@ -288,9 +286,7 @@ def test_insulated_bodies_solve_their_own_poisson_problems(cell, partition):
         bcs.append(fem.dirichletbc(value, fem.locate_dofs_topological(V, fdim, end), V))
     u, v = ufl.TrialFunction(V), ufl.TestFunction(V)
     solver = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
-    uh = LinearProblem(
-        ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx, v * ufl.dx, bcs=bcs, petsc_options=solver
-    ).solve()
+    uh = LinearProblem(ufl.inner(ufl.grad(u), ufl.grad(v)) * ufl.dx, v * ufl.dx, bcs=bcs, petsc_options=solver).solve()
     exact = fem.Function(V)
     for cells, shift in zip(sides(domain), (0, 3), strict=True):
         exact.interpolate(lambda x, shift=shift: x[0] * (1 - x[0]) / 2 + shift, cells0=cells)
