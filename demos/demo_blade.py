@@ -116,9 +116,10 @@ def main(
         derived={"cauchy_stress": cut.solid.cauchy_stress(cut.state.u)},
     ) as recording:
         run(cut.mechanics, until, control, recording)
-        recording.write_fields(cut.state.time)
     history = {name: recording.column(name) for name in recording.history}
     draw(cut, history, law, out, dim)
+    if history["time"][-1] < until:
+        raise typer.Exit(1)  # interrupted: what was recorded stays
     summary = summarise(cut, history, law, dim, time.perf_counter() - begun)
     write_summary(out / "summary.json", summary, MPI.COMM_WORLD)
     check(summary, steady=dim == 2 and not quick and not friction)
