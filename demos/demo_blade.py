@@ -68,7 +68,7 @@ VISCOSITY = 0.002
 
 SETTINGS = {
     # (dim, quick): mesh parameters, tip radius, G_c, depth of the cut
-    (2, False): (dict(dim=2, Lx=4, H=14, lc=0.05, band=0.3, growth=1.4, notch=0.5), 0.05, 0.2, 9.0),
+    (2, False): (dict(dim=2, Lx=4, H=13, lc=0.05, band=0.3, growth=1.4, notch=0.5), 0.05, 0.2, 8.6),
     (2, True): (dict(dim=2, Lx=4, H=6, lc=0.1, band=0.4, notch=0.5), 0.1, 0.4, 2.0),
     (3, False): (dict(dim=3, sym=1, lc=0.2, band=1.0, nz=8, notch=0.6), 0.2, 0.8, 3.4),
     (3, True): (dict(dim=3, sym=1, lc=0.3, band=0.6, growth=1.6, nz=3, notch=0.6), 0.3, 0.8, 1.6),
