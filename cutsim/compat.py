@@ -9,9 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 
 def _processor() -> str:
@@ -62,6 +65,21 @@ def form(
             jit_options=options,
             form_compiler_options=dict(form_compiler_options or {}),
         )
+
+
+def expression(expression: Any, points: NDArray[np.float64], mesh: Mesh) -> fem.Expression:
+    """Compile a UFL expression with the project's compiler options. Collective.
+
+    Args:
+        expression: UFL expression on the mesh.
+        points: Points of the reference cell at which it is evaluated, one a row.
+        mesh: The mesh.
+
+    Returns:
+        The compiled expression.
+    """
+    with jit_cache(mesh.comm):
+        return fem.Expression(expression, points, jit_options=JIT_OPTIONS)
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import ufl
 
 from cutsim.checks import require
-from cutsim.kinematics import Expr, safe_norm
+from cutsim.kinematics import Expr
 
 
 @dataclass(frozen=True)
@@ -78,4 +78,4 @@ class Coulomb:
 
     def traction(self, pressure: Expr, slip: Expr) -> Expr:
         """Friction traction on the body [stress], against its slip relative to the tool [length]."""
-        return -self.mu * pressure * slip / (safe_norm(slip, self.slip) + self.slip)
+        return -self.mu * pressure * slip / ufl.sqrt(ufl.dot(slip, slip) + self.slip**2)

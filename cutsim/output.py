@@ -20,14 +20,29 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from ufl.core.expr import Expr
 
+from cutsim import compat
 from cutsim.checks import require
-from cutsim.compat import JIT_OPTIONS, jit_cache
 from cutsim.units import Units
 
 _TAKEN = ("displacement", "fields")
 
 
-class HistoryWriter:
+class _Closing:
+    """A context manager that closes itself at the end."""
+
+    def close(self) -> None:
+        """Close; a second call does nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class HistoryWriter(_Closing):
     """A CSV table that grows by one row per accepted step.
 
     Every row is flushed as it is written, so the file is complete and readable at any moment, also after a
@@ -76,14 +91,6 @@ class HistoryWriter:
         if self._file is not None:
             self._file.close()
             self._file = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _open(self, path: Path, header: list[str]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -141,7 +148,7 @@ def write_summary(path: Path | str, values: Mapping[str, Any], comm: MPI.Comm) -
     _on_root(comm, write)
 
 
-class FieldWriter:
+class FieldWriter(_Closing):
     """Fields in VTX files (ADIOS2), which ParaView opens with its ADIOS2VTXReader. Collective.
 
     - ``displacement.bp`` holds u as it is solved for. Its points are the nodes of the space, so a crack opens
@@ -204,14 +211,6 @@ class FieldWriter:
         """Close the files. Collective; a second call does nothing."""
         self._stack.close()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
 
 def interpolate(function: fem.Function, expression: Expr) -> None:
     """Interpolate a UFL expression, compiled with the project's options. Collective.
@@ -220,12 +219,14 @@ def interpolate(function: fem.Function, expression: Expr) -> None:
         function: What is set, ghosts included.
         expression: UFL expression of the function's shape on its mesh.
     """
-    mesh = function.function_space.mesh
-    with jit_cache(mesh.comm):
-        points = function.function_space.element.interpolation_points()
-        compiled = fem.Expression(expression, points, jit_options=JIT_OPTIONS)
-    function.interpolate(compiled)
+    function.interpolate(_compiled(function, expression))
     function.x.scatter_forward()
+
+
+def _compiled(function: fem.Function, expression: Expr) -> fem.Expression:
+    """The expression at the interpolation points of a function's space."""
+    V = function.function_space
+    return compat.expression(expression, V.element.interpolation_points(), V.mesh)
 
 
 @dataclass(frozen=True)
@@ -244,10 +245,7 @@ class _Derived:
             return cls(u, shown, shown)
         degree = u.function_space.ufl_element().degree - 1
         sample = fem.Function(fem.functionspace(mesh, ("DG", degree, shape)))
-        points = sample.function_space.element.interpolation_points()
-        with jit_cache(mesh.comm):
-            source = fem.Expression(expression, points, jit_options=JIT_OPTIONS)
-        return cls(source, sample, shown)
+        return cls(_compiled(sample, expression), sample, shown)
 
     def update(self) -> None:
         self.sample.interpolate(self.source)

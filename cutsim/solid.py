@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cutsim.assembly import integrate
 from cutsim.checks import require
-from cutsim.compat import form
+from cutsim.compat import expression, form
 from cutsim.kinematics import Expr, deformation_gradient, green_lagrange
 from cutsim.materials import Material
 from cutsim.parameters import with_constants
@@ -122,7 +122,7 @@ class Solid(Term):
         points = basix.make_quadrature(cell, self.measures[0].metadata()["quadrature_degree"])[0]
         owned = self.state.mesh.topology.index_map(self.state.mesh.topology.dim).size_local
         cells = np.arange(owned, dtype=np.int32) if self.cells is None else self.cells[self.cells < owned]
-        J = fem.Expression(ufl.det(self.deformation_gradient(self.state.u)), points)
+        J = expression(ufl.det(self.deformation_gradient(self.state.u)), points, self.state.mesh)
         values = J.eval(self.state.mesh, cells)
         local = float(np.nan_to_num(values, nan=-np.inf).min()) if values.size else np.inf
         return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
