@@ -16,7 +16,7 @@ class EnergyAudit:
 
     Attributes:
         external: Work of supports, loads and tools.
-        entries: The other side: strain, cohesive_stored, fracture, friction, contact, viscous.
+        entries: The other side, `cutsim.terms.ENTRIES`; an entry to which no term contributes stays zero.
         scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with
             (`cutsim.mechanics` takes the energy that breaks one facet, the least a cracked mesh can resolve).
     """

@@ -21,11 +21,14 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 # History column -> label and colour, from the bottom of the stack upwards: what is kept, then what is lost.
 ENERGIES = {
     "energy_strain": ("strain", "#56B4E9"),
+    "energy_kinetic": ("kinetic", "#009E73"),
+    "energy_thermoelastic": ("thermoelastic", "#F0E442"),
     "energy_cohesive_stored": ("cohesive, stored", "#0072B2"),
     "energy_contact": ("contact", "#CC79A7"),
     "energy_fracture": ("fracture", "#D55E00"),
     "energy_friction": ("friction", "#E69F00"),
     "energy_viscous": ("viscous", "#999999"),
+    "energy_numerical": ("numerical", "#000000"),
 }
 
 

@@ -37,6 +37,7 @@ class Solid(Term):
         volumetric: "full" or "reduced" integration of the volumetric part; by default reduced for ν ≥ 0.45.
             On simplices of degree 1 both coincide, and a warning says that the element locks.
         viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
+        density: Mass per reference volume, > 0; needed by dynamics only [mass/length³].
 
     Attributes:
         measures: Measures over the body that integrate the two parts of the strain energy.
@@ -55,18 +56,21 @@ class Solid(Term):
         plane: Literal["strain", "stress"] = "strain",
         volumetric: Literal["auto", "full", "reduced"] = "auto",
         viscosity: float = 0.0,
+        density: float | None = None,
     ) -> None:
         gdim = state.mesh.geometry.dim
         require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
         require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
         require("volumetric", volumetric, volumetric in ("auto", "full", "reduced"), "'auto', 'full' or 'reduced'")
         require("viscosity", viscosity, viscosity >= 0, ">= 0")
+        require("density", density, density is None or density > 0, "> 0")
         self.name = name
         self.state = state
         self.material = material
         self._law = with_constants(state.mesh, material)
         self.plane = plane
         self.viscosity = viscosity
+        self.density = density
         self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
         self.measures = self._choose_measures(volumetric)

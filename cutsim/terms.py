@@ -14,7 +14,10 @@ from numpy.typing import NDArray
 from cutsim.kinematics import Expr
 
 #: Entries of the energy audit; the external work equals their sum (docs/theory.md §6).
-ENTRIES = ("strain", "cohesive_stored", "fracture", "friction", "contact", "viscous")
+ENTRIES = (
+    "strain", "kinetic", "thermoelastic", "cohesive_stored", "contact",  # stored
+    "fracture", "friction", "viscous", "numerical",  # lost
+)  # fmt: skip
 
 
 class Term:
