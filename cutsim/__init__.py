@@ -2,11 +2,12 @@
 
 from cutsim.cohesive import Bilinear, CohesiveLaw, Exponential
 from cutsim.contact import Coulomb, PenaltyContact
-from cutsim.interface import Crack, Surface
+from cutsim.interface import Crack
 from cutsim.loads import Support, Traction
 from cutsim.materials import LinearElastic, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff
 from cutsim.mechanics import Mechanics
 from cutsim.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
+from cutsim.points import Surface
 from cutsim.solid import Solid
 from cutsim.space import cracked_space
 from cutsim.state import State

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from cutsim.checks import require
 from cutsim.cohesive import CohesiveLaw, separation_curve
 from cutsim.contact import Coulomb, PenaltyContact
-from cutsim.interface import Crack, Surface
+from cutsim.interface import Crack
 from cutsim.loads import Support
 from cutsim.materials import Material
 from cutsim.mechanics import Mechanics
 from cutsim.meshing import TaggedMesh
+from cutsim.points import Surface
 from cutsim.recording import Columns
 from cutsim.solid import Solid
 from cutsim.space import cracked_space
@@ -143,7 +144,7 @@ class BladeCut:
         reaction = self.whole * self.mechanics.reaction(self.plate)
         depth = -float(self.halves[0].position.value[1])
         imbalance = abs(reaction - force) / abs(force) if force else 0.0
-        cut = self.crack.integral(np.interp(self.crack.point_values("opening"), *self.separation))
+        cut = self.crack.points.integral(np.interp(self.crack.point_values("opening"), *self.separation))
         return {
             "depth": (depth, "length"),
             "force": (force, "force"),

@@ -10,20 +10,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import basix.ufl
 import numpy as np
 import ufl
-from dolfinx import default_scalar_type, fem, la
-from dolfinx.mesh import Mesh, create_submesh
-from mpi4py import MPI
+from dolfinx import default_scalar_type, fem
+from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.checks import require
 from cutsim.cohesive import CohesiveLaw, process_zone_element
-from cutsim.compat import form
 from cutsim.contact import PenaltyContact
-from cutsim.kinematics import Expr, displacement_jump, midsurface_normal, safe_norm
+from cutsim.kinematics import Expr, displacement_jump, midsurface_normal, safe_norm, surface_frame
 from cutsim.parameters import with_constants
+from cutsim.points import FacetPoints, Surface, Values
 from cutsim.sizes import facet_size, normal_size
 from cutsim.space import crack_measure_entities
 from cutsim.state import State
@@ -35,42 +33,32 @@ logger = logging.getLogger(__name__)
 _PATH, _PATH_WEIGHTS = (0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(5), (1.0, 0.0), strict=True))
 # relative distance below its history at which a point still counts as loading
 _AT_HISTORY = 1e-9
-# what is known at each integration point
-_COLUMNS = ("demand", "cohesive_power", "contact_power", "stored", "damage", "opening", "sliding", "pressure")
 
 
 @dataclass(frozen=True)
-class Surface:
-    """A surface that a tool can touch: a facet measure and, for a crack, the side of it.
+class Response:
+    """The law at a displacement: symbolic, at an integration point.
 
-    Args:
-        measure: Facet measure.
-        side: "+" or "-" on a crack, None on the outer boundary.
+    Attributes:
+        jump: Displacement jump δ = u⁻ − u⁺ [length].
+        opening: δ·n [length].
+        slide: Tangential part of the jump, a vector [length].
+        sliding: Its magnitude [length].
+        demand: Loading measure of the cohesive law [its own unit].
+        cohesive: Cohesive traction on the '+' face, a vector [stress].
+        pressure: Contact pressure ≥ 0 [stress].
+        damage: Damage in opening and sliding [–]; 1 without a law.
+        normal: Unit normal of the mid-surface, from '+' to '−'.
     """
-
-    measure: ufl.Measure
-    side: Literal["+", "-"] | None = None
-
-    @classmethod
-    def exterior(cls, state: State, facets: NDArray[np.int32]) -> "Surface":
-        """A part of the outer boundary, given by its local facets."""
-        return cls(state.measures.exterior(facets))
-
-    def restrict(self, f: Expr) -> Expr:
-        """Restriction of an expression to the side."""
-        return f if self.side is None else f(self.side)
-
-
-@dataclass(frozen=True)
-class _Response:
-    """The law at a displacement: symbolic, at an integration point."""
 
     jump: Expr
     opening: Expr
+    slide: Expr
     sliding: Expr
     demand: Expr
     cohesive: Expr
     pressure: Expr
+    damage: tuple[Expr, Expr]
     normal: Expr
 
 
@@ -91,8 +79,7 @@ class Crack(Term):
             faces has no meaning [length]; by default the larger of 3 ε_n and the facet size.
 
     Attributes:
-        submesh: Mesh of the crack's facets.
-        facets: Local facet of the parent mesh for each cell of the submesh; the order of all per-facet arrays.
+        points: Its integration points, with the facets in the order of all per-facet arrays.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
         size: Mean size of the facets along the crack, their shortest edge [length].
         normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
@@ -125,12 +112,11 @@ class Crack(Term):
         self._current = normal == "current"
         self._allowed_penetration = penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
-        self.dS = state.measures.interior(self.entities)(
-            metadata={"quadrature_degree": 4, "quadrature_scheme": "default"}
+        self.points = FacetPoints(
+            state.mesh, np.asarray(facets, dtype=np.int32), state.measures.interior(self.entities), interior=True
         )
-        self._make_history(np.asarray(facets, dtype=np.int32))
-        self.size = self._mean(facet_size(state.mesh, self.facets))
-        self.normal_size = self._mean(normal_size(state.mesh, self.facets))
+        self.size = self.points.mean(facet_size(state.mesh, self.points.facets))
+        self.normal_size = self.points.mean(normal_size(state.mesh, self.points.facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         self._symbolic_law = None if law is None else with_constants(state.mesh, law)
         self._symbolic_contact = with_constants(state.mesh, self.contact)
@@ -138,31 +124,42 @@ class Crack(Term):
         self._range = fem.Constant(state.mesh, default_scalar_type(closing_range or max(floor, self.size)))
         self._warn_coarse(young)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
-        self._points_form = form(self._point_values(), entity_maps=self.entity_maps)
+        self._kappa, self._multiplier = self.points.function(), self.points.function()
+        self._multiplier_old = self._multiplier.x.array.copy()
+        columns = self._columns()
+        self._point_values = self.points.evaluator(columns)
+        zero = np.zeros_like(self.points.weights)
+        self._trial: dict[str, Values] = dict.fromkeys(columns, zero)
+        self._trial_old = self._trial
+        self._work: dict[str, Values] = {"cohesive": zero, "contact": zero}
+        self._work_old = self._work
 
     # -- virtual work ---------------------------------------------------------------------------------------------
 
     @property
     def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
         """Map from facets of the mesh to cells of the crack's submesh."""
-        return {self.submesh: self._facet_to_cell}
+        return self.points.entity_maps
 
     @property
     def facet_energy(self) -> float:
         """Energy that breaks a facet of mean size in opening; 0 without a law."""
-        return self.law.toughness[0] * self._mean(self.weights.sum(axis=1)) if self.law is not None else 0.0
+        return (
+            self.law.toughness[0] * self.points.mean(self.points.weights.sum(axis=1)) if self.law is not None else 0.0
+        )
 
     def surface(self, side: Literal["+", "-"]) -> Surface:
         """One face of the crack, for tool contact."""
-        return Surface(self.dS, side)
+        return Surface(self.points, side)
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ T·(v⁻ − v⁺) dΓ₀ of cohesive traction and contact pressure."""
-        response = self._response(self.state.u)
+        response = self.response(self.state.u)
         traction = response.cohesive - response.pressure * response.normal
-        return ufl.inner(traction, displacement_jump(v)) * self.dS
+        return ufl.inner(traction, displacement_jump(v)) * self.points.measure
 
-    def _response(self, u: Expr) -> _Response:
+    def response(self, u: Expr) -> Response:
+        """The law at a displacement, restricted to the crack."""
         law, contact = self._symbolic_law, self._symbolic_contact
         N = ufl.FacetNormal(self.state.mesh)
         n = midsurface_normal(u, N) if self._current else N("+")
@@ -170,16 +167,18 @@ class Crack(Term):
         gap = ufl.dot(jump, n)
         slide = jump - gap * n
         opening = ufl.conditional(ufl.ge(gap, 0), gap, 0.0)
-        multiplier = self._multiplier("+") / contact.stiffness if self._allowed_penetration else 0.0
+        multiplier = self.points.at(self._multiplier) / contact.stiffness if self._allowed_penetration else 0.0
         fade = ufl.exp(-((ufl.dot(jump, jump) / self._range**2) ** 2))
         pressure = fade * contact.pressure(multiplier - gap)
         if law is None:
-            return _Response(jump, gap, safe_norm(slide, 1e-12), ufl.as_ufl(0.0), 0 * jump, pressure, n)
+            none, whole = ufl.as_ufl(0.0), (ufl.as_ufl(1.0), ufl.as_ufl(1.0))
+            return Response(jump, gap, slide, safe_norm(slide, 1e-12), none, 0 * jump, pressure, whole, n)
         sliding = safe_norm(slide, 1e-12 * law.opening)
         demand = law.demand(opening, sliding)
         kappa = self._history(demand)
         k_n, k_t = law.stiffness(opening, sliding, kappa)
-        return _Response(jump, gap, sliding, demand, k_n * opening * n + k_t * slide, pressure, n)
+        cohesive = k_n * opening * n + k_t * slide
+        return Response(jump, gap, slide, sliding, demand, cohesive, pressure, law.damage(kappa), n)
 
     def _history(self, demand: Expr) -> Expr:
         """Largest demand so far, the present one included.
@@ -187,70 +186,30 @@ class Crack(Term):
         A step starts with every point exactly at its history.  There it counts as loading, so that Newton's first
         tangent is that of the growing crack, and not a mixture of loading and unloading points drawn by rounding.
         """
-        kappa = self._kappa("+")
+        kappa = self.points.at(self._kappa)
         return ufl.conditional(ufl.gt(demand, (1 - _AT_HISTORY) * kappa), demand, kappa)
 
     # -- history --------------------------------------------------------------------------------------------------
 
-    def _make_history(self, facets: NDArray[np.int32]) -> None:
-        mesh, fdim = self.state.mesh, self.state.mesh.topology.dim - 1
-        self.submesh, parents = create_submesh(mesh, fdim, np.unique(facets))[:2]
-        self.facets = np.asarray(parents, dtype=np.int32)
-        facet_map = mesh.topology.index_map(fdim)
-        self._facet_to_cell = np.full(facet_map.size_local + facet_map.num_ghosts, -1, dtype=np.int32)
-        self._facet_to_cell[parents] = np.arange(len(parents), dtype=np.int32)
-        cell = self.submesh.topology.cell_name()
-        scalar = fem.functionspace(self.submesh, basix.ufl.quadrature_element(cell, degree=4))
-        self._values = fem.functionspace(
-            self.submesh, basix.ufl.quadrature_element(cell, value_shape=(len(_COLUMNS),), degree=4)
-        )
-        self._kappa = fem.Function(scalar)
-        self._multiplier = fem.Function(scalar)
-        self._multiplier_old = np.zeros_like(self._multiplier.x.array)
-        # both spaces have the same points in each cell, but number them on their own
-        cells = self.submesh.topology.index_map(fdim)
-        self._owned = cells.size_local
-        self._scalar_dofs = scalar.dofmap.list
-        self._value_dofs = self._values.dofmap.list
-        weights = ufl.inner(ufl.as_vector([1.0] * len(_COLUMNS)), ufl.TestFunction(self._values)("+")) * self.dS
-        self.weights = self._assemble(form(weights, entity_maps=self.entity_maps))[..., 0]
-        shape = self._value_dofs.shape
-        self._trial = {name: np.zeros(shape) for name in _COLUMNS}
-        self._work = {name: np.zeros(shape) for name in ("cohesive", "contact")}
-        self._work_old = {name: np.zeros(shape) for name in self._work}
-        self._trial_old = self._trial
-
-    def _assemble(self, compiled: fem.Form) -> NDArray[np.float64]:
-        """Point vector, shape (local crack facets, points, columns), equal on owner and ghosts."""
-        b = fem.assemble_vector(compiled)
-        b.scatter_reverse(la.InsertMode.add)
-        b.scatter_forward()
-        return b.array.reshape(-1, len(_COLUMNS))[self._value_dofs]
-
-    def _point_values(self) -> ufl.Form:
+    def _columns(self) -> dict[str, Expr]:
+        """What is known at each point, at the fraction s of the step's displacement increment."""
         u_s = self.state.u_old + self._s * (self.state.u - self.state.u_old)
-        r = self._response(u_s)
+        r = self.response(u_s)
         increment = displacement_jump(self.state.u) - displacement_jump(self.state.u_old)
-        law = self._symbolic_law
-        damage = ufl.as_ufl(1.0) if law is None else law.damage(self._history(r.demand))[0]
-        columns = {
+        return {
             "demand": r.demand,
             "cohesive_power": ufl.dot(r.cohesive, increment),
             "contact_power": -r.pressure * ufl.dot(r.normal, increment),
             "stored": 0.5 * ufl.dot(r.cohesive, r.jump),
-            "damage": damage,
+            "damage": r.damage[0],
             "opening": r.opening,
             "sliding": r.sliding,
             "pressure": r.pressure,
         }
-        test = ufl.TestFunction(self._values)("+")
-        return ufl.inner(ufl.as_vector([columns[name] for name in _COLUMNS]), test) * self.dS
 
-    def _evaluate_at(self, s: float) -> dict[str, NDArray[np.float64]]:
-        """All columns at the fraction s of the step's displacement increment."""
+    def _evaluate_at(self, s: float) -> dict[str, Values]:
         self._s.value = s
-        values = self._assemble(self._points_form) / self.weights[..., None]
-        return {name: values[..., i] for i, name in enumerate(_COLUMNS)}
+        return self._point_values()
 
     def evaluate(self) -> None:
         """Trial history, and the work of the step integrated along the path of the displacement. Collective."""
@@ -269,10 +228,10 @@ class Crack(Term):
         if self._allowed_penetration is None:
             return False
         pressure = self._evaluate_at(1.0)["pressure"]
-        change = np.abs(pressure - self._multiplier.x.array[self._scalar_dofs])
-        if self._max(change) <= self.contact.stiffness * self._allowed_penetration:
+        change = np.abs(pressure - self.points.get(self._multiplier))
+        if self.points.maximum(change) <= self.contact.stiffness * self._allowed_penetration:
             return False
-        self._multiplier.x.array[self._scalar_dofs] = pressure
+        self.points.set(self._multiplier, pressure)
         return True
 
     def rollback(self) -> None:
@@ -282,55 +241,43 @@ class Crack(Term):
 
     def commit(self) -> None:
         """Adopt history, work and multiplier of the step."""
-        kappa = self._kappa.x.array
-        kappa[self._scalar_dofs] = np.maximum(kappa[self._scalar_dofs], self._trial["demand"])
+        self.points.set(self._kappa, np.maximum(self.points.get(self._kappa), self._trial["demand"]))
         self._multiplier_old[:] = self._multiplier.x.array
         self._work_old = self._work
         self._trial_old = self._trial
 
-    # -- reductions -----------------------------------------------------------------------------------------------
-
-    def integral(self, values: NDArray[np.float64]) -> float:
-        """Integral over the reference crack of values at the integration points, as `point_values`. Collective."""
-        owned = slice(0, self._owned)
-        return float(self.state.mesh.comm.allreduce((values * self.weights)[owned].sum(), op=MPI.SUM))
-
-    def _max(self, values: NDArray[np.float64]) -> float:
-        local = float(values[: self._owned].max(initial=-np.inf))
-        return float(self.state.mesh.comm.allreduce(local, op=MPI.MAX))
-
     def energies(self) -> dict[str, float]:
         """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""
-        stored = self.integral(self._trial["stored"])
+        stored = self.points.integral(self._trial["stored"])
         return {
             "cohesive_stored": stored,
-            "fracture": self.integral(self._work["cohesive"]) - stored,
-            "contact": self.integral(self._work["contact"]),
+            "fracture": self.points.integral(self._work["cohesive"]) - stored,
+            "contact": self.points.integral(self._work["contact"]),
         }
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
-        return self._max(self._trial["damage"] - self._trial_old["damage"]) if self.law is not None else 0.0
+        return self.points.maximum(self._trial["damage"] - self._trial_old["damage"]) if self.law is not None else 0.0
 
     def diagnose(self) -> str | None:
         """Say where the trial state of the last solve opens or closes most. Collective."""
         values = self._evaluate_at(1.0)
-        opening, penetration = self._max(values["opening"]), self._max(-values["opening"])
+        opening, penetration = self.points.maximum(values["opening"]), self.points.maximum(-values["opening"])
         return f"{self.name}: largest opening {opening:.3g}, largest penetration {max(penetration, 0.0):.3g}"
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
-        penetration = max(self._max(-self._trial["opening"]), 0.0) / self.normal_size
+        penetration = max(self.points.maximum(-self._trial["opening"]), 0.0) / self.normal_size
         columns = {
-            f"{self.name}_opening": (self._max(self._trial["opening"]), "length"),
+            f"{self.name}_opening": (self.points.maximum(self._trial["opening"]), "length"),
             f"{self.name}_penetration": (penetration, "one"),
         }
         if self.law is not None:
             kind = "length" if self.state.mesh.geometry.dim == 2 else "area"
-            columns[f"{self.name}_broken"] = (self.integral(self._trial["damage"]), kind)
+            columns[f"{self.name}_broken"] = (self.points.integral(self._trial["damage"]), kind)
         return columns
 
-    def point_values(self, name: str) -> NDArray[np.float64]:
+    def point_values(self, name: str) -> Values:
         """Trial values at the integration points, shape (local crack facets, points).
 
         Args:
@@ -341,17 +288,21 @@ class Crack(Term):
         """
         if name == "dissipated":
             return self._work["cohesive"] - self._trial["stored"]
-        require("name", name, name in _COLUMNS, f"one of {(*_COLUMNS, 'dissipated')}")
+        require("name", name, name in self._trial, f"one of {(*self._trial, 'dissipated')}")
         return self._trial[name]
 
-    def facet_mean(self, name: str) -> NDArray[np.float64]:
-        """Mean over each local crack facet of a point quantity; arguments as `point_values`."""
-        return (self.point_values(name) * self.weights).sum(axis=1) / self.weights.sum(axis=1)
+    def dissipation(self) -> Values:
+        """Fracture dissipation of the trial step at the integration points [energy per reference area]."""
+        before = self._work_old["cohesive"] - self._trial_old["stored"]
+        return self.point_values("dissipated") - before
 
-    def _mean(self, per_facet: NDArray[np.float64]) -> float:
-        total = np.array([per_facet[: self._owned].sum(), self._owned])
-        total = self.state.mesh.comm.allreduce(total, op=MPI.SUM)
-        return float(total[0] / total[1])
+    def facet_mean(self, name: str) -> Values:
+        """Mean over each local crack facet of a point quantity; arguments as `point_values`."""
+        return self.points.facet_mean(self.point_values(name))
+
+    def frame(self, u: Expr) -> tuple[Expr, ...]:
+        """Unit tangents of the mid-surface that turn with it: one in 2-D, two in 3-D."""
+        return surface_frame(u, self.state.mesh, self.response(u).normal, current=self._current)
 
     def _warn_coarse(self, young: float) -> None:
         if self.law is None:

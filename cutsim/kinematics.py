@@ -68,6 +68,30 @@ def midsurface_normal(u: Expr, N: Expr) -> Expr:
     return n / ufl.sqrt(ufl.dot(n, n))
 
 
+def surface_frame(u: Expr, mesh: Any, n: Expr, *, current: bool) -> tuple[Expr, ...]:
+    """Unit tangents of a crack that turn with its mid-surface: components along them are objective.
+
+    The first is the image F̄ A of an edge A of the facet under the mean deformation gradient F̄ = ½(F⁺ + F⁻), the second
+    completes it to a right-handed frame with n.
+
+    Args:
+        u: Displacement on a cracked space (unrestricted).
+        mesh: The mesh.
+        n: Unit normal of the mid-surface, from '+' to '−'.
+        current: Whether n is the normal of the current mid-surface; else of the reference one.
+
+    Returns:
+        One unit vector in 2-D, two in 3-D, for use on interior facets.
+    """
+    if len(n) == 2:
+        return (ufl.as_vector([-n[1], n[0]]),)
+    edge = ufl.FacetJacobian(mesh)("+")[:, 0]
+    if current:
+        edge = edge + 0.5 * (ufl.grad(u)("+") + ufl.grad(u)("-")) * edge
+    first = edge / ufl.sqrt(ufl.dot(edge, edge))
+    return first, ufl.cross(n, first)
+
+
 def displacement_jump(u: Expr) -> Expr:
     """Displacement jump δ = u⁻ − u⁺ (positive along n⁺ when the crack opens)."""
     return u("-") - u("+")

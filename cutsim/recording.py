@@ -130,7 +130,7 @@ class _CrackFields:
 
     def __init__(self, crack: Crack) -> None:
         self.crack = crack
-        space = fem.functionspace(crack.submesh, ("DG", 0))
+        space = fem.functionspace(crack.points.submesh, ("DG", 0))
         self._dofs = space.dofmap.list[:, 0]
         self.functions = [fem.Function(space, name=name) for name in CRACK_FIELDS]
 

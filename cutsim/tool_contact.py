@@ -12,9 +12,9 @@ from cutsim.assembly import global_dot, integrate, moment, nodal_forces, resulta
 from cutsim.checks import require
 from cutsim.compat import form
 from cutsim.contact import Coulomb, PenaltyContact
-from cutsim.interface import Surface
 from cutsim.kinematics import Expr, tangential
 from cutsim.parameters import with_constants
+from cutsim.points import Surface
 from cutsim.state import State
 from cutsim.terms import Term
 from cutsim.tools import Path, Shape
@@ -60,7 +60,7 @@ class ToolContact(Term):
         self._contact = with_constants(state.mesh, contact)
         self._coulomb = None if friction is None else with_constants(state.mesh, friction)
         self.symmetric = friction is None
-        self._surfaces = tuple(Surface(s.measure(metadata={"quadrature_degree": 4}), s.side) for s in surfaces)
+        self._surfaces = tuple(surfaces)
         self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
         self.position_old = fem.Constant(state.mesh, start.astype(default_scalar_type))
         v = ufl.TestFunction(state.V)

@@ -180,7 +180,7 @@ def draw(cut: BladeCut, history: dict[str, np.ndarray], law: Exponential, out: P
     stress = ufl.dev(cut.solid.cauchy_stress(u))
     interpolate(von_mises, ufl.sqrt(1.5 * ufl.inner(stress, stress)))
     grid = gather_grid(u, {"von Mises": von_mises})
-    facets = gather_facets(u, cut.crack.facets, cut.crack.facet_mean("damage"))
+    facets = gather_facets(u, cut.crack.points.facets, cut.crack.facet_mean("damage"))
     tip = np.asarray(cut.halves[0].position.value)
     tip = np.where(np.arange(dim) == 1, tip, 0.0)
     edge = None if dim == 2 else (0.0, 0.0, WIDTH)

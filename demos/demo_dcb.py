@@ -203,7 +203,7 @@ class Beam:
     @property
     def front(self) -> float:
         """Where the damage, averaged across the width, crosses one half [mm]. Collective."""
-        mesh, d = self.crack.submesh, self.crack.submesh.topology.dim
+        mesh, d = self.crack.points.submesh, self.crack.points.submesh.topology.dim
         owned = np.arange(mesh.topology.index_map(d).size_local, dtype=np.int32)
         rows = np.column_stack([compute_midpoints(mesh, d, owned)[:, 0], self.crack.facet_mean("damage")[owned]])
         x, damage = np.concatenate(mesh.comm.allgather(rows)).T
@@ -304,7 +304,7 @@ def draw(beam: Beam, recording: Recording, out: Path, title: str) -> None:
         plot_curves(out / "force.png", curves, xlabel="opening [mm]", ylabel="force [N]", title=title)
         plot_energy(out / "energy.png", {k: np.asarray(v) for k, v in recording.history.items()}, xlabel="path [mm]")
     body = gather_grid(state.u, {"stress": extreme_bending(beam)})
-    crack = gather_facets(state.u, beam.crack.facets, beam.crack.facet_mean("damage"))
+    crack = gather_facets(state.u, beam.crack.points.facets, beam.crack.facet_mean("damage"))
     scale = 4 * beam.specimen.height / opening.max()  # shown four arm heights apart
     for grid in (body, crack):
         if grid is not None:

@@ -363,7 +363,7 @@ def draw(beam: Bending, recording: Recording, compliance: float, out: Path) -> N
     """Load, energies and the deformed beam."""
     state = beam.solid.state
     grid = gather_grid(state.u, {"stress": axial_stress(beam.solid)})
-    crack = gather_facets(state.u, beam.crack.facets, beam.crack.facet_mean("damage"))
+    crack = gather_facets(state.u, beam.crack.points.facets, beam.crack.facet_mean("damage"))
     draw_body(
         out / "beam.png",
         grid,

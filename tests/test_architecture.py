@@ -12,7 +12,7 @@ SOURCES = Path(cutsim.__file__).parent
 LAYERS = [
     {"checks", "kinematics", "measures", "compat", "assembly", "options", "parameters", "sizes", "units"},
     {"materials", "cohesive", "contact", "tools", "meshing", "space"},
-    {"state", "terms", "preconditioners", "tangent"},
+    {"state", "terms", "points", "preconditioners", "tangent"},
     {"interface", "solid", "loads", "solver"},
     {"tool_contact", "energy"},
     {"mechanics"},

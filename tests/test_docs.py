@@ -13,8 +13,8 @@ from conftest import make_blocks
 
 from cutsim.cohesive import CohesiveLaw
 from cutsim.contact import PenaltyContact
-from cutsim.interface import Surface
 from cutsim.materials import Material
+from cutsim.points import Surface
 from cutsim.tools import Shape
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -127,6 +127,6 @@ def test_distance_of_cone(shape):
 @pytest.mark.parametrize("friction", [None, test_tangents.FRICTION], ids=["smooth", "rough"])
 def test_tangent_of_cone(shape, friction):
     b = make_blocks(3)
-    surface = Surface(b.state.measures.exterior(b.face(2, 1.0)))
+    surface = Surface.exterior(b.state, b.face(2, 1.0))
     tool = test_tangents.touch(b, shape, (0.4, 0.5, 0.9), [surface], friction)
     test_tangents.assert_slope_two(tool, b.state, test_tangents.smooth(b.state.V, 4, 0.02), 0.05)

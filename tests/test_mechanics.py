@@ -11,10 +11,11 @@ from cutsim.assembly import integrate
 from cutsim.cohesive import Exponential
 from cutsim.compat import form
 from cutsim.contact import Coulomb, PenaltyContact
-from cutsim.interface import Crack, Surface
+from cutsim.interface import Crack
 from cutsim.loads import Support, Traction
 from cutsim.materials import NeoHookean
 from cutsim.mechanics import Mechanics
+from cutsim.points import Surface
 from cutsim.recording import Recording
 from cutsim.stepping import StepControl, run
 from cutsim.tool_contact import ToolContact
@@ -29,7 +30,7 @@ def pried_and_pressed(comm=MPI.COMM_WORLD, n=6, gdim=2, **options):
     up = gdim - 1
     start = np.append(np.full(gdim - 1, 0.25), 1.32)
     path = Path.polyline([0, 1], [start, start - 0.15 * np.eye(gdim)[up] + 0.05 * np.eye(gdim)[0]])
-    surface = Surface(b.state.measures.exterior(b.face(up, 1.0)))
+    surface = Surface.exterior(b.state, b.face(up, 1.0))
     contact, friction = PenaltyContact(40.0, 0.02), Coulomb(0.2, 5e-3)
     ball = ToolContact(b.state, Ball(0.3), path, [surface], contact=contact, friction=friction, name="ball")
     supports = [Support(b.state, b.face(up, 0.0), i) for i in range(gdim)]
@@ -130,7 +131,7 @@ def test_crack_has_one_plus_side():
     N = ufl.FacetNormal(b.state.mesh)
     for plus, sign in ((b.lower, 1), (b.upper, -1), ((0.0, 0.0, 1.0), 1), ((0.0, 0.1, -1.0), -1)):
         crack = Crack(b.state, b.facets, plus, young=E)
-        assert integrate(form(N("+")[2] * crack.dS)) == pytest.approx(sign)
+        assert integrate(form(N("+")[2] * crack.points.measure)) == pytest.approx(sign)
 
 
 @pytest.mark.mpi

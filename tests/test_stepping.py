@@ -10,11 +10,11 @@ from mpi4py import MPI
 
 from cutsim.cohesive import Exponential
 from cutsim.contact import Coulomb, PenaltyContact
-from cutsim.interface import Surface
 from cutsim.loads import Support, Traction
 from cutsim.materials import NeoHookean
 from cutsim.mechanics import Mechanics
 from cutsim.output import read_history
+from cutsim.points import Surface
 from cutsim.recording import Recording
 from cutsim.stepping import StepControl, StepError, run
 from cutsim.tool_contact import ToolContact
@@ -33,7 +33,7 @@ def everything(comm=MPI.COMM_WORLD):
         b.state,
         Plane((0.0, -1.0)),
         path,
-        [Surface(b.state.measures.exterior(b.face(1, 1.0)))],
+        [Surface.exterior(b.state, b.face(1, 1.0))],
         contact=PenaltyContact(30.0, 0.01),
         friction=Coulomb(0.3, 1e-3),
     )
@@ -184,7 +184,7 @@ def test_every_corner_is_met():
         b.state,
         Plane((0.0, -1.0)),
         Path.polyline([0.1 * 3, 0.5], [(0, 2), (0, 3)]),
-        [Surface(b.state.measures.exterior(b.face(1, 1.0)))],
+        [Surface.exterior(b.state, b.face(1, 1.0))],
         contact=PenaltyContact(1.0),
     )
     mechanics = Mechanics(b.state, [b.solid(), b.crack(EXPONENTIAL), load, plate], supports)

@@ -11,8 +11,8 @@ from dolfinx.fem.petsc import assemble_matrix
 
 from cutsim.compat import form
 from cutsim.contact import Coulomb, PenaltyContact
-from cutsim.interface import Surface
 from cutsim.materials import LinearElastic, MooneyRivlin, NeoHookean, StVenantKirchhoff
+from cutsim.points import Surface
 from cutsim.tool_contact import ToolContact
 from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
 
@@ -219,7 +219,7 @@ def test_tool_on_outer_surface(shape, friction):
     shape, place = SHAPES[shape]
     gdim = len(place)
     b = make_blocks(gdim)
-    surface = Surface(b.state.measures.exterior(b.face(gdim - 1, 1.0)))
+    surface = Surface.exterior(b.state, b.face(gdim - 1, 1.0))
     tool = touch(b, shape, place, [surface], friction)
     asymmetry = assert_slope_two(tool, b.state, smooth(b.state.V, 4, 0.02), 0.05)
     assert friction is None or asymmetry > 1e-3
@@ -229,7 +229,7 @@ def test_tool_on_outer_surface(shape, friction):
 def test_blend(depth):
     """The depth of a plane in the surface, in the three branches of the blended pressure."""
     b = make_blocks()
-    surface = Surface(b.state.measures.exterior(b.face(1, 1.0)))
+    surface = Surface.exterior(b.state, b.face(1, 1.0))
     tool = touch(b, Plane((0.0, -1.0)), (0.5, 1.0 - depth), [surface], FRICTION)
     u = smooth(b.state.V, 4, 0.002)
     if depth < 0:

@@ -7,10 +7,10 @@ from dolfinx import fem
 
 from cutsim.assembly import moment
 from cutsim.contact import Coulomb, PenaltyContact
-from cutsim.interface import Surface
 from cutsim.loads import Support
 from cutsim.materials import NeoHookean
 from cutsim.mechanics import Mechanics
+from cutsim.points import Surface
 from cutsim.solid import Solid
 from cutsim.state import State
 from cutsim.stepping import StepControl
@@ -28,7 +28,7 @@ def indented(gdim, friction=FRICTION):
     down, along = np.eye(gdim)[-1], np.eye(gdim)[0]
     start = 0.45 * np.ones(gdim) + (1.35 - 0.45) * down
     path = Path.polyline([0, 1, 2], [start, start - 0.2 * down, start - 0.2 * down + 0.1 * along])
-    top = Surface(state.measures.exterior(b.face(gdim - 1, 1.0)))
+    top = Surface.exterior(state, b.face(gdim - 1, 1.0))
     ball = ToolContact(state, Ball(0.35), path, [top], contact=CONTACT, friction=friction)
     supports = [Support(state, b.face(gdim - 1, 0.0), i, name=f"base_{'xyz'[i]}") for i in range(gdim)]
     return Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], supports, rtol=1e-11), ball
@@ -75,7 +75,7 @@ def test_frictionless_contact_force_is_the_derivative_of_its_energy():
 def rigid_block_under_plate(path, friction):
     """A block that does not move at all under a moving plate: the penetration is that of the path."""
     b = make_blocks()
-    top = Surface(b.state.measures.exterior(b.face(1, 1.0)))
+    top = Surface.exterior(b.state, b.face(1, 1.0))
     plate = ToolContact(b.state, Plane((0.0, -1.0)), path, [top], contact=PenaltyContact(50.0), friction=friction)
     cells = np.union1d(b.lower, b.upper)
     return Mechanics(b.state, [plate], b.drive(cells, [0.0, 0.0], "base"))
@@ -114,7 +114,7 @@ def test_corners_of_the_path_are_those_of_the_tool():
 def test_refuses_what_cannot_touch():
     b = make_blocks()
     path = Path(lambda t: np.zeros(2))
-    surface = Surface(b.state.measures.exterior(b.face(1, 1.0)))
+    surface = Surface.exterior(b.state, b.face(1, 1.0))
     with pytest.raises(ValueError, match="surfaces = 0 is not allowed"):
         ToolContact(b.state, Ball(1.0), path, [], contact=CONTACT)
     with pytest.raises(ValueError, match=r"path = .* 2 components"):
