@@ -1,7 +1,5 @@
 """Supports and dead loads."""
 
-from collections.abc import Callable
-
 import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
@@ -11,11 +9,10 @@ from cutsim.assembly import global_dot, nodal_forces, resultant
 from cutsim.checks import require
 from cutsim.compat import form
 from cutsim.kinematics import Expr
+from cutsim.parameters import History, Schedule
 from cutsim.space import locate_dofs
 from cutsim.state import State
 from cutsim.terms import Term
-
-History = Callable[[float], float]
 
 
 class Support:
@@ -56,18 +53,17 @@ class Support:
         self._dofs = dofs[dofs < owned]
         found = state.mesh.comm.allreduce(len(self._dofs))
         require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
-        self._history: History = value if callable(value) else lambda _: float(value)
-        self._value = fem.Constant(state.mesh, default_scalar_type(self._history(0.0)))
-        self.bc = fem.dirichletbc(self._value, dofs, state.V.sub(component))
+        self._value = Schedule(state.mesh, value)
+        self.bc = fem.dirichletbc(self._value.constant, dofs, state.V.sub(component))
 
     @property
     def displacement(self) -> float:
         """Prescribed displacement at the end of the step [length]."""
-        return float(self._value.value)
+        return self._value.value
 
     def begin(self, time: float) -> None:
         """Set the displacement to its value at a time."""
-        self._value.value = self._history(time)
+        self._value.begin(time)
 
     def reaction(self, residual: NDArray[np.float64]) -> float:
         """Force of the support on the body along its component [force]. Collective.

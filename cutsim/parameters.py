@@ -1,5 +1,6 @@
-"""Parameters of laws as form constants, so that another value needs no other kernel."""
+"""Numbers of laws and loads as form constants, so that another value needs no other kernel."""
 
+from collections.abc import Callable
 from copy import copy
 from dataclasses import fields
 from typing import Any, TypeVar
@@ -8,6 +9,7 @@ from dolfinx import default_scalar_type, fem
 from dolfinx.mesh import Mesh
 
 Law = TypeVar("Law")
+History = Callable[[float], float]
 
 
 def with_constants(mesh: Mesh, law: Law) -> Law:
@@ -27,3 +29,28 @@ def with_constants(mesh: Mesh, law: Law) -> Law:
             # the dataclasses are frozen, and their checks are for numbers
             object.__setattr__(symbolic, field.name, fem.Constant(mesh, default_scalar_type(value)))
     return symbolic
+
+
+class Schedule:
+    """A form constant that is a function of time.
+
+    Args:
+        mesh: Mesh of the forms.
+        value: A number, or a function of time.
+
+    Attributes:
+        constant: The constant, at first with the value at time 0.
+    """
+
+    def __init__(self, mesh: Mesh, value: float | History) -> None:
+        self._history: History = value if callable(value) else lambda _: float(value)
+        self.constant = fem.Constant(mesh, default_scalar_type(self._history(0.0)))
+
+    @property
+    def value(self) -> float:
+        """The present value."""
+        return float(self.constant.value)
+
+    def begin(self, time: float) -> None:
+        """Set the constant to its value at a time."""
+        self.constant.value = self._history(time)

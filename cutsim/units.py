@@ -10,7 +10,10 @@ from dataclasses import dataclass
 
 from cutsim.checks import require
 
-KINDS = ("length", "area", "force", "time", "stress", "energy", "toughness", "moment", "angle", "one")
+KINDS = (
+    "length", "area", "force", "time", "stress", "energy", "toughness", "moment", "angle",
+    "temperature", "power", "flux", "entropy", "one",
+)  # fmt: skip
 
 _STRESS = {("mm", "N"): "MPa", ("m", "N"): "Pa", ("mm", "kN"): "GPa", ("m", "kN"): "kPa"}
 _ENERGY = {("mm", "N"): "mJ", ("m", "N"): "J", ("mm", "kN"): "J", ("m", "kN"): "kJ"}
@@ -24,17 +27,19 @@ class Units:
         length: Symbol of the unit of length.
         force: Symbol of the unit of force.
         time: Symbol of the unit of time.
+        temperature: Symbol of the unit of temperature.
     """
 
     length: str = "mm"
     force: str = "N"
     time: str = "s"
+    temperature: str = "K"
 
     def of(self, kind: str) -> str:
         """Symbol of the unit of a kind of quantity.
 
         Args:
-            kind: One of `KINDS`; toughness is energy per area, one is dimensionless.
+            kind: One of `KINDS`; toughness is energy per area, flux power per area, one is dimensionless.
 
         Returns:
             The symbol: a named unit where the set has one (MPa, mJ), composed otherwise (lbf/in²).
@@ -44,16 +49,21 @@ class Units:
         """
         require("kind", kind, kind in KINDS, f"one of {', '.join(KINDS)}")
         base = (self.length, self.force)
+        energy = _ENERGY.get(base, f"{self.force}·{self.length}")
         return {
             "length": self.length,
             "area": f"{self.length}²",
             "force": self.force,
             "time": self.time,
             "stress": _STRESS.get(base, f"{self.force}/{self.length}²"),
-            "energy": _ENERGY.get(base, f"{self.force}·{self.length}"),
+            "energy": energy,
             "toughness": f"{self.force}/{self.length}",
             "moment": f"{self.force}·{self.length}",
             "angle": "rad",
+            "temperature": self.temperature,
+            "power": f"{energy}/{self.time}",
+            "flux": f"{self.force}/({self.length}·{self.time})",
+            "entropy": f"{energy}/{self.temperature}",
             "one": "1",
         }[kind]
 
