@@ -29,6 +29,9 @@ class Support:
         dim: Dimension of the entities; facets by default.
         corners: Times at which the velocity jumps.
 
+    Attributes:
+        dofs: Owned dofs that it holds.
+
     Raises:
         ValueError: The component does not exist, or no entity is found on any rank.
     """
@@ -50,8 +53,8 @@ class Support:
         self.name, self.state, self.component, self.corners = name, state, component, corners
         dofs = gdim * locate_dofs(state.V, dim, entities) + component
         owned = len(state.increment)
-        self._dofs = dofs[dofs < owned]
-        found = state.mesh.comm.allreduce(len(self._dofs))
+        self.dofs = dofs[dofs < owned]
+        found = state.mesh.comm.allreduce(len(self.dofs))
         require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
         self._value = Schedule(state.mesh, value)
         self.bc = fem.dirichletbc(self._value.constant, dofs, state.V.sub(component))
@@ -65,13 +68,17 @@ class Support:
         """Set the displacement to its value at a time."""
         self._value.begin(time)
 
+    def rates(self, start: float, end: float) -> tuple[float, float]:
+        """Prescribed velocity and acceleration at the start of a span of time without a corner."""
+        return self._value.rates(start, end)
+
     def reaction(self, residual: NDArray[np.float64]) -> float:
         """Force of the support on the body along its component [force]. Collective.
 
         Args:
             residual: Owned entries of internal minus external nodal forces.
         """
-        return float(self.state.mesh.comm.allreduce(float(residual[self._dofs].sum())))
+        return float(self.state.mesh.comm.allreduce(float(residual[self.dofs].sum())))
 
 
 class Traction(Term):

@@ -54,3 +54,9 @@ class Schedule:
     def begin(self, time: float) -> None:
         """Set the constant to its value at a time."""
         self.constant.value = self._history(time)
+
+    def rates(self, start: float, end: float) -> tuple[float, float]:
+        """First and second derivative at a time, from the values there, in the middle and at a later time."""
+        half = 0.5 * (end - start)
+        first, second, third = (self._history(t) for t in (start, start + half, end))
+        return (4 * second - 3 * first - third) / (2 * half), (first - 2 * second + third) / half**2

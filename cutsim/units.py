@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from cutsim.checks import require
 
 KINDS = (
-    "length", "area", "force", "time", "stress", "energy", "toughness", "moment", "angle",
+    "length", "area", "force", "time", "stress", "energy", "toughness", "moment", "angle", "velocity",
     "temperature", "power", "flux", "entropy", "one",
 )  # fmt: skip
 
@@ -60,6 +60,7 @@ class Units:
             "toughness": f"{self.force}/{self.length}",
             "moment": f"{self.force}·{self.length}",
             "angle": "rad",
+            "velocity": f"{self.length}/{self.time}",
             "temperature": self.temperature,
             "power": f"{energy}/{self.time}",
             "flux": f"{self.force}/({self.length}·{self.time})",
