@@ -8,6 +8,7 @@ from cutsim.materials import LinearElastic, Material, MooneyRivlin, NeoHookean, 
 from cutsim.mechanics import Mechanics
 from cutsim.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
 from cutsim.points import Surface
+from cutsim.schemes import GeneralisedAlpha, Newmark
 from cutsim.solid import Solid
 from cutsim.space import cracked_space
 from cutsim.state import State
@@ -26,11 +27,13 @@ __all__ = [
     "Crack",
     "Exponential",
     "FlatPunch",
+    "GeneralisedAlpha",
     "LinearElastic",
     "Material",
     "Mechanics",
     "MooneyRivlin",
     "NeoHookean",
+    "Newmark",
     "Path",
     "PenaltyContact",
     "Plane",

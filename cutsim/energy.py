@@ -16,14 +16,21 @@ class EnergyAudit:
 
     Attributes:
         external: Work of supports, loads and tools.
+        initial: Energy at the start, such as that of an initial velocity.
         entries: The other side, `cutsim.terms.ENTRIES`; an entry to which no term contributes stays zero.
         scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with
             (`cutsim.mechanics` takes the energy that breaks one facet, the least a cracked mesh can resolve).
     """
 
     external: float = 0.0
+    initial: float = 0.0
     entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(ENTRIES, 0.0))
     scale: float = 0.0
+
+    def start(self, energies: Iterable[Mapping[str, float]]) -> "EnergyAudit":
+        """Audit of a state that starts with energy; arguments as `advance`."""
+        audit = self.advance(0.0, energies)
+        return replace(audit, initial=sum(audit.entries.values()))
 
     def advance(self, work: float, energies: Iterable[Mapping[str, float]]) -> "EnergyAudit":
         """Audit after a step.
@@ -42,11 +49,11 @@ class EnergyAudit:
 
     @property
     def closure(self) -> float:
-        """(external work − sum of the entries) / largest turnover so far [–]."""
-        return (self.external - sum(self.entries.values())) / self.scale if self.scale > 0 else 0.0
+        """(initial energy + external work − sum of the entries) / largest turnover so far [–]."""
+        return (self.initial + self.external - sum(self.entries.values())) / self.scale if self.scale > 0 else 0.0
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity)."""
-        columns = {"work_external": (self.external, "energy")}
+        columns = {"work_external": (self.external, "energy"), "energy_initial": (self.initial, "energy")}
         columns |= {f"energy_{name}": (value, "energy") for name, value in self.entries.items()}
         return columns | {"energy_closure": (self.closure, "one")}

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import ufl
@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from cutsim.assembly import global_dot
 from cutsim.checks import require
 from cutsim.energy import EnergyAudit
+from cutsim.inertia import Inertia
 from cutsim.interface import Crack
 from cutsim.loads import Support
+from cutsim.schemes import TRAPEZOIDAL, Scheme
+from cutsim.solid import Solid
 from cutsim.solver import NonlinearProblem, Outcome
 from cutsim.state import State
 from cutsim.terms import Term
@@ -27,19 +30,26 @@ _prefixes = chain(["cut_"], (f"cut{n}_" for n in count(2)))
 
 
 class Mechanics:
-    """Quasi-static equilibrium of solids, cracks, tools and loads.
+    """Equilibrium or motion of solids, cracks, tools and loads.
 
     Args:
         state: Displacement and time.
         terms: Terms of the virtual work.
         supports: Prescribed displacements.
+        analysis: "quasi-static" or "dynamic"; the latter adds the inertia of the solids, each of which needs a density.
+        scheme: Time integration of a dynamic analysis; the trapezoidal rule by default.
+        mass: "consistent" or "lumped", see `cutsim.inertia`.
         petsc_options: PETSc options without prefix; they win over the presets.
         petsc_options_prefix: Prefix of all PETSc options of the problem, no other's; by default "cut_" for the first
             problem of a process, then "cut2_" and so on.
         rtol: Residual tolerance relative to the reactions.
 
+    Attributes:
+        inertia: Velocity, acceleration and momentum; None if quasi-static.
+
     Raises:
-        ValueError: There is no term, or two terms or supports share a name.
+        ValueError: There is no term, two terms or supports share a name, or a dynamic analysis has no solid or one
+            without density.
     """
 
     def __init__(
@@ -48,6 +58,9 @@ class Mechanics:
         terms: Sequence[Term],
         supports: Sequence[Support] = (),
         *,
+        analysis: Literal["quasi-static", "dynamic"] = "quasi-static",
+        scheme: Scheme = TRAPEZOIDAL,
+        mass: Literal["consistent", "lumped"] = "consistent",
         petsc_options: Mapping[str, Any] | None = None,
         petsc_options_prefix: str | None = None,
         rtol: float = 1e-8,
@@ -55,16 +68,21 @@ class Mechanics:
         names = [t.name for t in terms] + [s.name for s in supports if s.name]
         require("terms", len(terms), len(terms) > 0, "at least one term")
         require("names", names, len(set(names)) == len(names), "different for all terms and supports")
-        self.state, self.terms, self.supports = state, tuple(terms), tuple(supports)
-        self._parts: tuple[Term | Support, ...] = (*terms, *supports)
+        require("analysis", analysis, analysis in ("quasi-static", "dynamic"), "'quasi-static' or 'dynamic'")
+        self.state, self._static, self.supports = state, tuple(terms), tuple(supports)
+        solids = [t for t in terms if isinstance(t, Solid)]
+        self.inertia = Inertia(state, solids, scheme, mass) if analysis == "dynamic" else None
+        self.terms: tuple[Term, ...] = self._static if self.inertia is None else (*terms, self.inertia)
+        self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
         v = ufl.TestFunction(state.V)
         cracks = [t for t in terms if isinstance(t, Crack)]
         self.problem = NonlinearProblem(
-            sum((t.residual(v) for t in terms), start=ufl.Form([])),
+            sum((t.residual(v) for t in self.terms), start=ufl.Form([])),
             state.u,
             bcs=[s.bc for s in supports],
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
             symmetric=all(t.symmetric for t in terms),
+            inertia=self.inertia is not None,
             interface_dofs=self._interface_nodes(cracks) if cracks else None,
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
@@ -80,10 +98,34 @@ class Mechanics:
         return tuple(sorted({c for part in self._parts for c in part.corners}))
 
     def begin(self, time: float) -> None:
-        """Start a trial step that ends at `time`: constants move, the displacement stays."""
+        """Start a trial step that ends at `time`. Collective.
+
+        Constants move. The displacement stays, or with inertia goes on at the present velocity.
+        """
+        if self.inertia is not None and not self.inertia.started:
+            self._start(self.inertia, time)
         self.state.begin(time)
         for part in self._parts:
             part.begin(time)
+        if self.inertia is not None:
+            self.problem.known[:] = self.inertia.history(self._residual_old)
+
+    def _start(self, inertia: Inertia, end: float) -> None:
+        """Motion, forces and energies at the start of a dynamic analysis whose first step ends at a time."""
+        for term in self._static:
+            term.evaluate()
+            term.commit()
+        for support in self.supports:
+            inertia.prescribe(support.dofs, *support.rates(self.state.time, end))
+        static = self._out_of_balance()
+        self._residual = self._residual_old = inertia.start(static, self.problem.bcs, self.problem.fixed)
+        self.audit = self._trial_audit = self.audit.start([t.energies() for t in self.terms])
+
+    def _out_of_balance(self) -> NDArray[np.float64]:
+        residual = self.problem.residual()
+        forces = residual.array_r.copy()
+        residual.destroy()
+        return forces
 
     def solve(self, line_search: str | None = None) -> Outcome:
         """Find equilibrium, with contact augmentations. Collective.
@@ -111,11 +153,12 @@ class Mechanics:
         """Trial history, energies and reactions of the converged trial state. Collective."""
         for term in self.terms:
             term.evaluate()
-        residual = self.problem.residual()
-        self._residual = residual.array_r.copy()
-        residual.destroy()
+        fixed = self.problem.fixed
+        self._residual = self._out_of_balance()
+        if self.inertia is not None:
+            self._residual = self.inertia.balance(self._residual, self._residual_old, ~fixed)
         mean = 0.5 * (self._residual + self._residual_old)
-        work = global_dot(self.state.mesh.comm, mean, self.state.increment)
+        work = global_dot(self.state.mesh.comm, mean[fixed], self.state.increment[fixed])
         work += sum(t.external_work() for t in self.terms)
         self._trial_audit = self.audit.advance(work, [t.energies() for t in self.terms])
 

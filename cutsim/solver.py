@@ -70,7 +70,8 @@ class NonlinearProblem:
     the first iteration. Converged means that the prescribed values hold and that the norm of the free rows of F is
     at most `rtol` times the force scale. The force scale is the norm of the reactions, of the present iterate or
     of the last converged solve, whichever is larger; without any Dirichlet condition it is the norm of F at the
-    start. A state free of forces is accepted when F is down to rounding, 1e-14 ||diag(K)|| (max |u| + h).
+    start, and with inertia the larger of both. A state free of forces is accepted when F is down to rounding,
+    1e-14 ||diag(K)|| (max |u| + h).
 
     Args:
         F: Residual, linear in a test function of the space of u: internal minus external virtual work.
@@ -85,8 +86,14 @@ class NonlinearProblem:
         jit_options: Override `cutsim.compat.JIT_OPTIONS`.
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
         symmetric: Whether the tangent is symmetric.
+        inertia: Whether inertia balances forces, too: there may be supports without any reaction.
         form_compiler_options: Options of FFCx.
         rtol: Tolerance relative to the force scale; PETSc option `snes_rtol`.
+
+    Attributes:
+        known: Owned nodal forces that are added to those of F, such as the share of the last step in a time
+            integration scheme; zero at first.
+        fixed: Which owned dofs have a Dirichlet condition.
 
     Raises:
         ValueError: The prefix is empty or `rtol` is not positive.
@@ -105,13 +112,14 @@ class NonlinearProblem:
         jit_options: Mapping[str, Any] | None = None,
         interface_dofs: NDArray[np.int32] | None = None,
         symmetric: bool = False,
+        inertia: bool = False,
         form_compiler_options: Mapping[str, Any] | None = None,
         rtol: float = 1e-8,
     ) -> None:
         require("rtol", rtol, rtol > 0.0, "positive")
         self._options = Options(petsc_options_prefix, petsc_options or {})
         self.u, self.bcs = u, list(bcs)
-        self._symmetric, self._interface_dofs = symmetric, interface_dofs
+        self._symmetric, self._interface_dofs, self._by_start = symmetric, interface_dofs, inertia or not bcs
         if J is None:
             J = ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
         self._L, self._a = (
@@ -134,10 +142,11 @@ class NonlinearProblem:
         # SNES iterates on a vector of its own: were it that of u, line searches would spoil their own start.
         self._x = la.create_petsc_vector(*layout)
         self._f = self._x.duplicate()
-        self._fixed = np.zeros(self._n, dtype=bool)
+        self.known: NDArray[np.float64] = np.zeros(self._n)
+        self.fixed = np.zeros(self._n, dtype=bool)
         for bc in self.bcs:
             dofs = bc.dof_indices()[0]
-            self._fixed[dofs[dofs < self._n]] = True
+            self.fixed[dofs[dofs < self._n]] = True
         self._previous_scale = 0.0
         cells = np.arange(V.mesh.topology.index_map(V.mesh.topology.dim).size_local, dtype=np.int32)
         h = np.max(V.mesh.h(V.mesh.topology.dim, cells), initial=0.0)
@@ -257,7 +266,7 @@ class NonlinearProblem:
         return _SENTENCES.get(reason, f"PETSc SNES reason {reason}")
 
     def residual(self) -> PETSc.Vec:
-        """Internal minus external forces at the present u, the constrained rows included.
+        """Internal minus external forces at the present u, known ones and the constrained rows included.
 
         Returns:
             A new vector of the owned dofs; the caller owns it.
@@ -274,7 +283,7 @@ class NonlinearProblem:
             A new vector of the owned dofs; the caller owns it.
         """
         b = self.residual()
-        b.array[~self._fixed] = 0.0
+        b.array[~self.fixed] = 0.0
         return b
 
     def _assign(self, x: PETSc.Vec) -> None:
@@ -288,6 +297,7 @@ class NonlinearProblem:
         if lift:
             fem.apply_lifting(r, [self._a], [self.bcs], [self.u.x.array], -1.0)
         self._r.scatter_reverse(la.InsertMode.add)
+        r[: self._n] += self.known
 
     def _evaluate_residual(self, snes: PETSc.SNES, x: PETSc.Vec, b: PETSc.Vec) -> None:
         """Called by SNES: residual with lifting; u - g in the constrained rows."""
@@ -295,11 +305,11 @@ class NonlinearProblem:
         self._assemble_residual(lift=True)
         b.array[:] = self._r.array[: self._n]
         # While prescribed values do not hold, these rows carry lifting too; but then u is no solution either.
-        self._reaction = b.array_r[self._fixed]
-        b.array[self._fixed] = self._jump(x)
+        self._reaction = b.array_r[self.fixed]
+        b.array[self.fixed] = self._jump(x)
 
     def _jump(self, x: PETSc.Vec) -> NDArray[np.float64]:
-        return x.array_r[self._fixed] - self._g.array[: self._n][self._fixed]
+        return x.array_r[self.fixed] - self._g.array[: self._n][self.fixed]
 
     def _evaluate_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Called by SNES."""
@@ -308,7 +318,7 @@ class NonlinearProblem:
 
     def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:
         """Called by SNES after the linear solve: make the step of the constrained dofs exact."""
-        y.array[self._fixed] = self._jump(x)
+        y.array[self.fixed] = self._jump(x)
         if self._lagged is not None:
             self._lagged.observe(self._snes.getKSP().getIterationNumber())
         return True
@@ -316,9 +326,9 @@ class NonlinearProblem:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Called by SNES: reduce the local numbers, then judge."""
         f, x = snes.getFunction()[0].array_r, snes.getSolution().array_r
-        squares = [f[~self._fixed], self._reaction, self._tangent.diagonal[~self._fixed]]
+        squares = [f[~self.fixed], self._reaction, self._tangent.diagonal[~self.fixed]]
         free, reaction, stiffness = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
-        jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self._fixed], x))
+        jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self.fixed], x))
         self._size = max(self._size, size)
         length = self._size + self._h
         return self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
@@ -328,7 +338,7 @@ class NonlinearProblem:
         if iteration > 0 or not self._residuals:  # a start after a cured linear solve is no new iterate
             self._residuals.append(free)
         start = self._residuals[0]
-        self._force = reaction if self.bcs else start
+        self._force = max(reaction, start) if self._by_start else reaction
         self._scale = max(self._previous_scale, self._force)
         if not np.isfinite(free):
             return _Reason.DIVERGED_FNORM_NAN

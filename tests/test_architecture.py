@@ -11,10 +11,10 @@ SOURCES = Path(cutsim.__file__).parent
 # a module imports from its own layer and those before it
 LAYERS = [
     {"checks", "kinematics", "measures", "compat", "assembly", "options", "parameters", "sizes", "units"},
-    {"materials", "cohesive", "contact", "tools", "meshing", "space"},
+    {"materials", "cohesive", "contact", "tools", "schemes", "meshing", "space"},
     {"state", "terms", "points", "preconditioners", "tangent"},
     {"interface", "solid", "loads", "solver"},
-    {"tool_contact", "energy"},
+    {"tool_contact", "inertia", "energy"},
     {"mechanics"},
     {"stepping", "fracture"},
 ]

@@ -86,7 +86,7 @@ def test_audit_adds_up():
     assert later.closure == pytest.approx(0.125), "relative to the largest turnover, not the present one"
     assert audit.entries["strain"] == 1.5, "an audit is a value: a rejected step leaves no trace"
     assert EnergyAudit().closure == 0.0
-    assert set(audit.record()) == {"work_external", "energy_closure"} | {f"energy_{n}" for n in ENTRIES}
+    assert set(audit.record()) == {"work_external", "energy_initial", "energy_closure"} | {f"energy_{n}" for n in ENTRIES}
 
 
 def test_scale_keeps_small_energies_from_looking_unbalanced():
