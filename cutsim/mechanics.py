@@ -15,6 +15,7 @@ from cutsim.checks import require
 from cutsim.energy import EnergyAudit
 from cutsim.inertia import Inertia
 from cutsim.interface import Crack
+from cutsim.kinematics import Expr
 from cutsim.loads import Support
 from cutsim.schemes import TRAPEZOIDAL, Scheme
 from cutsim.solid import Solid
@@ -91,6 +92,11 @@ class Mechanics:
         self.audit = self._trial_audit = EnergyAudit(scale=max((c.facet_energy for c in cracks), default=0.0))
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
         self._residual_old: NDArray[np.float64] = self._residual
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """Fields beside the displacement for output, by name."""
+        return {}
 
     @property
     def corners(self) -> tuple[float, ...]:

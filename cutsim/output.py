@@ -154,8 +154,9 @@ class FieldWriter(_Closing):
     - ``displacement.bp`` holds u as it is solved for. Its points are the nodes of the space, so a crack opens
       when the grid is warped by u.
     - ``fields.bp`` holds the derived fields on a discontinuous linear space, with u beside them: the deformed
-      body can be coloured by stress. For u of degree k they are sampled in degree k - 1, for a linear u in
-      the middle of each cell, where stresses are most accurate and free of locking noise.
+      body can be coloured by stress. For u of degree k expressions are sampled in degree k - 1, for a linear u in
+      the middle of each cell, where stresses are most accurate and free of locking noise; a function, such as
+      a temperature, is shown as it is.
     - Each entry of ``surfaces`` is a file of its own: VTX takes one mesh and one element a file.
 
     Use it as a context manager. Files are readable up to the last step written, also after a crash.
@@ -241,8 +242,8 @@ class _Derived:
     def of(cls, u: fem.Function, name: str, expression: Expr) -> Self:
         mesh, shape = u.function_space.mesh, expression.ufl_shape
         shown = fem.Function(fem.functionspace(mesh, ("DG", 1, shape)), name=name)
-        if expression is u:
-            return cls(u, shown, shown)
+        if isinstance(expression, fem.Function):
+            return cls(expression, shown, shown)
         degree = u.function_space.ufl_element().degree - 1
         sample = fem.Function(fem.functionspace(mesh, ("DG", degree, shape)))
         return cls(_compiled(sample, expression), sample, shown)

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from cutsim.checks import require
 from cutsim.interface import Crack
 from cutsim.kinematics import Expr
-from cutsim.mechanics import Mechanics
 from cutsim.output import FieldWriter, HistoryWriter
 from cutsim.progress import Progress
-from cutsim.stepping import StepError, StepReport
+from cutsim.stepping import Problem, StepError, StepReport
 from cutsim.units import Units
 
 Columns = dict[str, tuple[float, str]]
@@ -33,7 +32,7 @@ class Recording:
 
     Args:
         folder: Where the files go.
-        mechanics: The problem.
+        problem: The problem.
         until: Time at which the run ends.
         title: What is running, in a word or two, for the progress bar.
         units: Units of the history's header.
@@ -49,7 +48,7 @@ class Recording:
     def __init__(
         self,
         folder: Path | str,
-        mechanics: Mechanics,
+        problem: Problem,
         until: float,
         *,
         title: str = "run",
@@ -60,19 +59,20 @@ class Recording:
         every: int = 5,
     ) -> None:
         require("every", every, every >= 0, ">= 0")
-        self.folder, self.mechanics, self._units = Path(folder), mechanics, units or Units()
+        self.folder, self.problem, self._units = Path(folder), problem, units or Units()
         self._show, self._extra, self._every = dict(show or {}), extra, every
         self.history: dict[str, list[float]] = {}
         self._stack = ExitStack()
         self._table: HistoryWriter | None = None
-        self._cracks = [_CrackFields(t) for t in mechanics.terms if isinstance(t, Crack) and t.law is not None]
-        comm, start = mechanics.state.mesh.comm, mechanics.state.time_old
+        self._cracks = [_CrackFields(t) for t in problem.terms if isinstance(t, Crack) and t.law is not None]
+        comm, start = problem.state.mesh.comm, problem.state.time_old
         self._progress = self._stack.enter_context(Progress(until, comm, title, start=start))
         self._unwritten: float | None = None
         self._fields: FieldWriter | None = None
         if every:
             surfaces = {c.crack.name: c.functions for c in self._cracks}
-            self._fields = self._stack.enter_context(FieldWriter(self.folder, mechanics.state.u, derived, surfaces))
+            derived = {**problem.fields, **(derived or {})}
+            self._fields = self._stack.enter_context(FieldWriter(self.folder, problem.state.u, derived, surfaces))
 
     def __call__(self, report: StepReport) -> None:
         """Record an accepted step. Collective."""
@@ -81,7 +81,7 @@ class Recording:
         columns["newton"] = (float(report.outcome.iterations), "one")
         columns["krylov"] = (float(report.outcome.linear_iterations), "one")
         columns["cuts"] = (float(report.cuts), "one")
-        comm = self.mechanics.state.mesh.comm
+        comm = self.problem.state.mesh.comm
         if self._table is None:
             kinds = {name: kind for name, (_, kind) in columns.items()}
             table = HistoryWriter(self.folder / "history.csv", kinds, self._units, comm)

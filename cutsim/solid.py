@@ -1,4 +1,4 @@
-"""A deformable body: hyperelastic bulk with optional Kelvin–Voigt viscosity (docs/theory.md §2)."""
+"""A deformable body: hyperelastic bulk, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
 
 import logging
 from typing import Literal
@@ -17,7 +17,9 @@ from cutsim.kinematics import Expr, deformation_gradient, green_lagrange
 from cutsim.materials import Material
 from cutsim.parameters import with_constants
 from cutsim.state import State
+from cutsim.temperature import Temperature
 from cutsim.terms import Term
+from cutsim.thermoelastic import ThermoElastic
 
 logger = logging.getLogger(__name__)
 
@@ -37,7 +39,9 @@ class Solid(Term):
         volumetric: "full" or "reduced" integration of the volumetric part; by default reduced for ν ≥ 0.45.
             On simplices of degree 1 both coincide, and a warning says that the element locks.
         viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
-        density: Mass per reference volume, > 0; needed by dynamics only [mass/length³].
+        density: Mass per reference volume, > 0; needed by dynamics and heat only [mass/length³].
+        thermoelastic: Thermal expansion and shear modulus that depends on temperature.
+        temperature: The temperature that acts on the body; with `thermoelastic` only.
 
     Attributes:
         measures: Measures over the body that integrate the two parts of the strain energy.
@@ -57,6 +61,8 @@ class Solid(Term):
         volumetric: Literal["auto", "full", "reduced"] = "auto",
         viscosity: float = 0.0,
         density: float | None = None,
+        thermoelastic: ThermoElastic | None = None,
+        temperature: Temperature | None = None,
     ) -> None:
         gdim = state.mesh.geometry.dim
         require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
@@ -64,6 +70,11 @@ class Solid(Term):
         require("volumetric", volumetric, volumetric in ("auto", "full", "reduced"), "'auto', 'full' or 'reduced'")
         require("viscosity", viscosity, viscosity >= 0, ">= 0")
         require("density", density, density is None or density > 0, "> 0")
+        together = (thermoelastic is None) == (temperature is None)
+        require("temperature", temperature, together, "given with thermoelastic, and only then")
+        softens = thermoelastic is not None and thermoelastic.softening != 0
+        # there λ₃ would have to be solved for with another ratio of the moduli at each temperature
+        require("plane", plane, plane == "strain" or not softens, "'strain' for a shear modulus that varies with heat")
         self.name = name
         self.state = state
         self.material = material
@@ -71,22 +82,28 @@ class Solid(Term):
         self.plane = plane
         self.viscosity = viscosity
         self.density = density
+        self.temperature = temperature
+        self._thermoelastic = None if thermoelastic is None else with_constants(state.mesh, thermoelastic)
         self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
         self.measures = self._choose_measures(volumetric)
         self._energy_form = form(self._stored(state.u))
         self._viscous_form = form(self._viscous_work()) if viscosity else None
         self._viscous = self._viscous_old = 0.0
+        self._thermal = self._thermal_old = 0.0
+        if temperature is not None:
+            self._temperature_seen = fem.Function(temperature.space)
+            self._temperature_seen.x.array[:] = temperature.value.x.array
+            self._heating_form = form(self._heating(temperature.value))
 
     def deformation_gradient(self, u: Expr) -> Expr:
         """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""
-        F = deformation_gradient(u)
-        return deformation_gradient(u, self._law.plane_stress_stretch(F)) if self.plane == "stress" else F
+        return self._deformation_gradient(u, self._temperature())
 
     def first_piola(self, u: Expr) -> Expr:
         """First Piola–Kirchhoff stress P = ∂W/∂F, 3 × 3 [stress]."""
         F = ufl.variable(self.deformation_gradient(u))
-        return ufl.diff(sum(self._law.energy(F)), F)
+        return ufl.diff(sum(self._energy(F, self._temperature())), F)
 
     def cauchy_stress(self, u: Expr) -> Expr:
         """Cauchy stress σ = P Fᵀ / J, 3 × 3 [stress]."""
@@ -95,7 +112,7 @@ class Solid(Term):
 
     def strain_energy_density(self, u: Expr) -> Expr:
         """Strain energy per reference volume W [energy/length³]."""
-        return sum(self._law.energy(self.deformation_gradient(u)))
+        return sum(self._energy(self.deformation_gradient(u), self._temperature()))
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of the elastic and viscous stresses."""
@@ -107,13 +124,16 @@ class Solid(Term):
         return work
 
     def evaluate(self) -> None:
-        """Add the viscous dissipation of the step. Collective."""
+        """Add the viscous dissipation of the step, and what the change of temperature adds. Collective."""
         if self._viscous_form is not None:
             self._viscous = self._viscous_old + integrate(self._viscous_form)
+        if self.temperature is not None:
+            self._thermal = self._thermal_old - integrate(self._heating_form)
+            self._temperature_trial = self.temperature.value.x.array.copy()
 
     def energies(self) -> dict[str, float]:
-        """Strain energy and viscous dissipation so far. Collective."""
-        return {"strain": integrate(self._energy_form), "viscous": self._viscous}
+        """Strain energy, viscous dissipation and minus the strain energy brought by heat so far. Collective."""
+        return {"strain": integrate(self._energy_form), "viscous": self._viscous, "thermoelastic": self._thermal}
 
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""
@@ -132,12 +152,14 @@ class Solid(Term):
         return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
 
     def rollback(self) -> None:
-        """Forget the viscous dissipation of the step."""
-        self._viscous = self._viscous_old
+        """Forget the energies of the step."""
+        self._viscous, self._thermal = self._viscous_old, self._thermal_old
 
     def commit(self) -> None:
-        """Adopt the viscous dissipation."""
-        self._viscous_old = self._viscous
+        """Adopt the energies, and the temperature at which the step was in equilibrium."""
+        self._viscous_old, self._thermal_old = self._viscous, self._thermal
+        if self.temperature is not None:
+            self._temperature_seen.x.array[:] = self._temperature_trial
 
     def _choose_measures(self, volumetric: str) -> tuple[ufl.Measure, ufl.Measure]:
         element = self.state.V.ufl_element()
@@ -162,10 +184,38 @@ class Solid(Term):
         )
         return first, second
 
-    def _stored(self, u: Expr) -> ufl.Form:
-        shear, volumetric = self._law.energy(self.deformation_gradient(u))
+    def _temperature(self) -> Expr | None:
+        return None if self.temperature is None else self.temperature.value
+
+    def _deformation_gradient(self, u: Expr, T: Expr | None) -> Expr:
+        F = deformation_gradient(u)
+        if self.plane == "strain":
+            return F
+        if self._thermoelastic is None:
+            return deformation_gradient(u, self._law.plane_stress_stretch(F))
+        stretch = self._thermoelastic.stretch(T)
+        return deformation_gradient(u, stretch * self._law.plane_stress_stretch(F / stretch))
+
+    def _energy(self, F: Expr, T: Expr | None) -> tuple[Expr, Expr]:
+        """Both parts of the strain energy per reference volume."""
+        if self._thermoelastic is None:
+            return self._law.energy(F)
+        stretch, factor = self._thermoelastic.stretch(T), self._thermoelastic.shear_factor(T)
+        shear, volumetric = self._law.energy(F / stretch)
+        return factor * stretch**3 * shear, stretch**3 * volumetric
+
+    def _stored(self, u: Expr, T: Expr | None = None) -> ufl.Form:
+        T = self._temperature() if T is None else T
+        shear, volumetric = self._energy(self._deformation_gradient(u, T), T)
         dx, dx_volumetric = self.measures
         return shear * dx + volumetric * dx_volumetric
+
+    def _heating(self, T: Expr) -> ufl.Form:
+        """Strain energy brought by the change of temperature since the last equilibrium, trapezoidal in u."""
+        new, old = self.state.u, self.state.u_old
+        seen = self._temperature_seen
+        total = self._stored(new, T) - self._stored(new, seen) + self._stored(old, T) - self._stored(old, seen)
+        return 0.5 * total
 
     def _viscous_work(self) -> ufl.Form:
         new, old = (green_lagrange(deformation_gradient(w)) for w in (self.state.u, self.state.u_old))

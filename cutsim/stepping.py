@@ -6,17 +6,20 @@ history → accept or reject → commit, record.
 
 import logging
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
 from types import FrameType
+from typing import Protocol
 
 from mpi4py import MPI
 
 from cutsim.checks import require
-from cutsim.mechanics import Mechanics
+from cutsim.kinematics import Expr
 from cutsim.solver import Outcome
+from cutsim.state import State
+from cutsim.terms import Term
 
 logger = logging.getLogger(__name__)
 
@@ -24,6 +27,68 @@ logger = logging.getLogger(__name__)
 _SLIVER = 0.1
 # corners that differ by less than this fraction of the smallest step are one
 _ROUNDING = 1e-6
+
+
+class Audit(Protocol):
+    """Books of a conserved quantity."""
+
+    @property
+    def closure(self) -> float:
+        """What is missing, relative to the largest turnover so far [–]."""
+
+
+class Problem(Protocol):
+    """What can be stepped: `cutsim.mechanics.Mechanics`, `HeatTransfer`, or both as `ThermoMechanics`.
+
+    Attributes:
+        state: Displacement and time.
+    """
+
+    state: State
+
+    @property
+    def terms(self) -> Sequence[Term]:
+        """Its terms."""
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """Fields beside the displacement for output, by name."""
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times that steps have to meet exactly."""
+
+    @property
+    def audit(self) -> Audit:
+        """Audit of the committed state."""
+
+    @property
+    def trial_audit(self) -> Audit:
+        """Audit including the trial step."""
+
+    def begin(self, time: float) -> None:
+        """Start a trial step that ends at `time`."""
+
+    def solve(self, line_search: str | None = None) -> Outcome:
+        """Solve the trial step. Collective."""
+
+    def evaluate(self) -> None:
+        """Trial history and audit of the solved step. Collective."""
+
+    def damage_increment(self) -> float:
+        """Largest growth of damage at a point in the trial step. Collective."""
+
+    def diagnose(self) -> str:
+        """After a failed solve: what is wrong and where, in words. Collective."""
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity). Collective."""
+
+    def rollback(self) -> None:
+        """Give the trial step up, bit for bit."""
+
+    def commit(self) -> None:
+        """Adopt the trial step."""
 
 
 class StepError(RuntimeError):
@@ -102,7 +167,7 @@ Recorder = Callable[[StepReport], None]
 
 
 def run(
-    mechanics: Mechanics,
+    problem: Problem,
     until: float,
     control: StepControl,
     record: Recorder = lambda _: None,
@@ -113,7 +178,7 @@ def run(
     Ctrl-C and SIGTERM end the run cleanly after the current step.
 
     Args:
-        mechanics: The problem; it goes on from its committed state.
+        problem: The problem; it goes on from its committed state.
         until: Time to reach [time].
         control: Step sizes.
         record: Called on all ranks after each accepted step.
@@ -126,14 +191,14 @@ def run(
         StepError: The smallest step was reached; says when, where and why.
         ValueError: `until` is not later than the committed time.
     """
-    state = mechanics.state
+    state = problem.state
     require("until", until, until > state.time_old, f"> the present time {state.time_old}")
-    corners = [c for c in (*mechanics.corners, until) if c <= until]
+    corners = [c for c in (*problem.corners, until) if c <= until]
     dt, report, number = control.first, None, 0
     with _interruptible(state.mesh.comm) as interrupted:
         while ahead := [c for c in corners if c > state.time_old + _ROUNDING * control.smallest]:
             corner = min(ahead)
-            report = _advance(mechanics, control, dt, corner)
+            report = _advance(problem, control, dt, corner)
             number += 1
             report.number = number
             record(report)
@@ -143,18 +208,18 @@ def run(
     return report
 
 
-def _advance(mechanics: Mechanics, control: StepControl, dt: float, corner: float) -> StepReport:
+def _advance(problem: Problem, control: StepControl, dt: float, corner: float) -> StepReport:
     """One accepted step of at most dt that does not pass the corner."""
-    state, cuts = mechanics.state, 0
+    state, cuts = problem.state, 0
     while True:
         start = state.time_old
         end = corner if start + (1 + _SLIVER) * dt >= corner else start + dt
-        outcome, refusal = _attempt(mechanics, control, end)
+        outcome, refusal = _attempt(problem, control, end)
         if refusal is None:
             size = end - start
-            mechanics.commit()
-            return StepReport(0, end, size, outcome, cuts, mechanics.record())
-        mechanics.rollback()
+            problem.commit()
+            return StepReport(0, end, size, outcome, cuts, problem.record())
+        problem.rollback()
         cuts += 1
         dt = control.cut * (end - start)
         logger.info("step to %.6g rejected (%s); next try %.3g", end, refusal, dt)
@@ -165,36 +230,36 @@ def _advance(mechanics: Mechanics, control: StepControl, dt: float, corner: floa
             )
 
 
-def _attempt(mechanics: Mechanics, control: StepControl, end: float) -> tuple[Outcome, str | None]:
+def _attempt(problem: Problem, control: StepControl, end: float) -> tuple[Outcome, str | None]:
     """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
-    before = mechanics.audit.closure
+    before = problem.audit.closure
     for line_search in control.line_searches:
-        mechanics.rollback()
-        mechanics.begin(end)
-        outcome = mechanics.solve(line_search)
-        failure = _failure(mechanics, outcome)
+        problem.rollback()
+        problem.begin(end)
+        outcome = problem.solve(line_search)
+        failure = _failure(problem, outcome)
         if failure is None:
             break
     else:
         return outcome, failure
-    growth = mechanics.damage_increment()
+    growth = problem.damage_increment()
     if control.damage is not None and growth > control.damage:
         return outcome, f"damage grows by {growth:.3g}, more than {control.damage:g}"
-    drift = abs(mechanics.trial_audit.closure - before)
+    drift = abs(problem.trial_audit.closure - before)
     if control.closure is not None and drift > control.closure:
         return outcome, f"energy closure changes by {drift:.2g}, more than {control.closure:g}"
     return outcome, None
 
 
-def _failure(mechanics: Mechanics, outcome: Outcome) -> str | None:
+def _failure(problem: Problem, outcome: Outcome) -> str | None:
     """Why a solve did not give an admissible state, in words; None if it did, and then the state is evaluated."""
     if outcome.converged:
-        mechanics.evaluate()
+        problem.evaluate()
         # forces can balance around an inverted element, but then its energy has no value
-        if isfinite(mechanics.trial_audit.closure):
+        if isfinite(problem.trial_audit.closure):
             return None
     why = "no admissible equilibrium" if outcome.converged else outcome.message
-    where = mechanics.diagnose()
+    where = problem.diagnose()
     return f"{why} after {outcome.iterations} iterations" + (f"; {where}" if where else "")
 
 

@@ -1,0 +1,65 @@
+"""What a term of the heat balance can do, and the audit of heat (docs/theory.md §3.4)."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from cutsim.temperature import Temperature
+from cutsim.terms import Term
+
+#: Entries of the heat audit: what is generated, and what becomes of it.
+GENERATED = ("friction", "fracture", "source")
+SPENT = ("stored", "outflow")
+
+
+class HeatTerm(Term):
+    """A term of the heat balance: `residual` is tested with a temperature, and is heat going in minus coming out.
+
+    Args:
+        temperature: The temperature.
+        name: Name in messages and columns of the history.
+    """
+
+    def __init__(self, temperature: Temperature, name: str) -> None:
+        self.temperature, self.state, self.name = temperature, temperature.state, name
+
+    def heat(self) -> dict[str, float]:
+        """Heat of the trial step by entry of the audit [energy]. Collective."""
+        return {}
+
+
+@dataclass(frozen=True)
+class HeatBalance:
+    """Heat since the start of a run [energy].
+
+    Attributes:
+        entries: Heat from friction, fracture and sources; heat stored in bodies and interfaces, and heat that has left
+            through boundaries and tools.
+        scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with.
+    """
+
+    entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys((*GENERATED, *SPENT), 0.0))
+    scale: float = 0.0
+
+    def advance(self, heats: Iterable[Mapping[str, float]]) -> "HeatBalance":
+        """Audit after a step.
+
+        Args:
+            heats: Contributions of the terms to the step.
+        """
+        entries = dict(self.entries)
+        for contribution in heats:
+            for name, value in contribution.items():
+                entries[name] += value
+        turnover = max(sum(abs(entries[name]) for name in names) for names in (GENERATED, SPENT))
+        return replace(self, entries=entries, scale=max(self.scale, turnover))
+
+    @property
+    def closure(self) -> float:
+        """(heat generated − stored − left) / largest turnover so far [–]."""
+        gap = sum(self.entries[name] for name in GENERATED) - sum(self.entries[name] for name in SPENT)
+        return gap / self.scale if self.scale > 0 else 0.0
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity)."""
+        columns = {f"heat_{name}": (value, "energy") for name, value in self.entries.items()}
+        return columns | {"heat_closure": (self.closure, "one")}
