@@ -4,20 +4,25 @@ Energy-release rates are positive when growth along the given direction releases
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 from typing import Literal
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import compute_midpoints
 from numpy.typing import ArrayLike, NDArray
 
 from cutsim.assembly import integrate
 from cutsim.checks import require
 from cutsim.compat import form
+from cutsim.interface import Crack
 from cutsim.solid import Solid
 
 Array = NDArray[np.float64]
+
+#: χ of `EndNotchedBeam` for isotropic arms, whatever Poisson's ratio (Bao, Ho, Suo and Fan 1992).
+ENF_CORRECTION = 0.206
 
 
 class JIntegral:
@@ -102,6 +107,36 @@ def _release(solid: Solid, direction: Array, q: fem.Function) -> ufl.Form:
     for W, dx in zip(solid.material.energy(F), solid.measures, strict=True):
         total += (ufl.inner(ufl.diff(W, F), ufl.outer(grad_u * e, grad_q)) - W * ufl.dot(e, grad_q)) * dx
     return total
+
+
+def crack_profile(crack: Crack, name: str, axis: int = 0) -> tuple[Array, Array]:
+    """A quantity along a crack, averaged over the facets with the same coordinate. Collective.
+
+    Args:
+        crack: The crack.
+        name: Quantity, as in `Crack.point_values`.
+        axis: Coordinate along the crack.
+
+    Returns:
+        Ascending coordinates of the facets' midpoints [length] and the means there, the same on all ranks.
+
+    Raises:
+        ValueError: The quantity or the axis is unknown.
+    """
+    mesh = crack.points.submesh
+    require("axis", axis, axis in range(mesh.geometry.dim), f"0 … {mesh.geometry.dim - 1}")
+    owned = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+    middle = compute_midpoints(mesh, mesh.topology.dim, owned)[:, axis]
+    rows = np.column_stack([middle, crack.facet_mean(name)[owned]])
+    x, values = np.concatenate(mesh.comm.allgather(rows)).T
+    places, column = np.unique(np.round(x, 6), return_inverse=True)
+    return places, np.bincount(column, values) / np.bincount(column)
+
+
+def crack_front(crack: Crack, axis: int = 0) -> float:
+    """Place where the damage falls below one half along a coordinate, in which the crack grows [length]. Collective."""
+    places, damage = crack_profile(crack, "damage", axis)
+    return float(np.interp(-0.5, -damage, places))
 
 
 def plane_modulus(young: float, poisson: float, plane: Literal["strain", "stress"] = "strain") -> float:
@@ -276,3 +311,88 @@ def crack_length_correction(young: float, shear: float) -> float:
     require("shear", shear, shear > 0, "> 0")
     gamma = 1.18 * young / shear
     return sqrt(young / (11 * shear) * (3 - 2 * (gamma / (1 + gamma)) ** 2))
+
+
+@dataclass(frozen=True)
+class EndNotchedBeam:
+    """End-notched flexure (ENF): three-point bending of two bonded arms, with a crack from one pin (mode II).
+
+    Beam theory with crack length a' = a + χh.  Both arms bend alike: each carries half of the shear force P/2 of the
+    cracked part, and they press on each other with P/4 above the pin.  There friction μP/4 holds the arms back by a
+    couple of arm h, which relieves the front like a crack shorter by 2μh/3.  This is so while the faces slide on: while
+    the load rises or the crack grows.
+
+        G = 9 P² (a' − 2μh/3)² / (16 E b² h³),    deflection = P ((3a'³ + 2L³ − 3μha'²)/(8Ebh³) + 3L/(10 G_s b h)),
+        slip of the faces above the pin = 3 P a' (a' − 4μh/3) / (2Ebh²).
+
+    Source: without friction and correction Russell and Street (1982); correction Bao, Ho, Suo and Fan (1992), shear
+    deflection by Timoshenko's theory, friction from the balance of two arms (docs/theory.md §7).
+
+    Args:
+        height: Height h > 0 of each arm [length].
+        thickness: Thickness b > 0 [length].
+        half_span: Distance L > 0 from a pin to the load in the middle [length].
+        modulus: Young's modulus E along the arms, E' in plane strain, > 0 [stress].
+        shear: Shear modulus G_s > 0 [stress]; infinite for beams that are rigid in shear.
+        correction: χ ≥ 0 [–]; 0 for arms clamped at the tip, `ENF_CORRECTION` for isotropic ones.
+        friction: Coefficient μ ≥ 0 of Coulomb friction between the faces [–].
+
+    Raises:
+        ValueError: A parameter is outside its range.
+    """
+
+    height: float
+    thickness: float
+    half_span: float
+    modulus: float
+    shear: float = inf
+    correction: float = 0.0
+    friction: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("height", "thickness", "half_span", "modulus", "shear"):
+            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+        for name in ("correction", "friction"):
+            require(name, getattr(self, name), getattr(self, name) >= 0, ">= 0")
+
+    def release(self, load: float, length: float) -> float:
+        """Energy-release rate G in sliding under a load P, with a crack of the given length [force/length].
+
+        Raises:
+            ValueError: The crack does not end between pin and load.
+        """
+        relieved = self._effective(length) - 2 * self.friction * self.height / 3
+        return 9 * load**2 * relieved**2 / (16 * self.modulus * self.thickness**2 * self.height**3)
+
+    def compliance(self, length: float) -> float:
+        """Deflection under the load over the load, while the faces slide on [length/force].
+
+        Raises:
+            ValueError: The crack does not end between pin and load.
+        """
+        a, h, b, L = self._effective(length), self.height, self.thickness, self.half_span
+        bending = (3 * a**3 + 2 * L**3 - 3 * self.friction * h * a**2) / (8 * self.modulus * b * h**3)
+        return bending + 0.3 * L / (self.shear * b * h)
+
+    def slip(self, load: float, length: float) -> float:
+        """Sliding of the faces on each other above the pin [length].
+
+        Raises:
+            ValueError: The crack does not end between pin and load.
+        """
+        a, h = self._effective(length), self.height
+        return 1.5 * load * a * (a - 4 * self.friction * h / 3) / (self.modulus * self.thickness * h**2)
+
+    def propagation(self, toughness: float, length: float) -> tuple[float, float]:
+        """Load and deflection at which a crack of the given length grows [force, length]; stable from a' = 0.69 L on.
+
+        Raises:
+            ValueError: The crack does not end between pin and load, or the toughness is not positive.
+        """
+        require("toughness", toughness, toughness > 0, "> 0")
+        load = sqrt(toughness / self.release(1.0, length))
+        return load, load * self.compliance(length)
+
+    def _effective(self, length: float) -> float:
+        require("length", length, 0 < length < self.half_span, f"in (0, half_span = {self.half_span:g})")
+        return length + self.correction * self.height

@@ -45,7 +45,6 @@ import basix
 import numpy as np
 import typer
 from dolfinx import fem
-from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 
 from cutsim import (
@@ -63,7 +62,7 @@ from cutsim import (
     run,
 )
 from cutsim.compat import JIT_OPTIONS, jit_cache
-from cutsim.fracture import CantileverBeams, crack_length_correction, plane_modulus
+from cutsim.fracture import CantileverBeams, crack_front, crack_length_correction, plane_modulus
 from cutsim.output import write_summary
 from cutsim.pictures import draw_body, gather_facets, gather_grid
 from cutsim.plots import Curve, plot_curves, plot_energy
@@ -203,13 +202,7 @@ class Beam:
     @property
     def front(self) -> float:
         """Where the damage, averaged across the width, crosses one half [mm]. Collective."""
-        mesh, d = self.crack.points.submesh, self.crack.points.submesh.topology.dim
-        owned = np.arange(mesh.topology.index_map(d).size_local, dtype=np.int32)
-        rows = np.column_stack([compute_midpoints(mesh, d, owned)[:, 0], self.crack.facet_mean("damage")[owned]])
-        x, damage = np.concatenate(mesh.comm.allgather(rows)).T
-        places, column = np.unique(np.round(x, 6), return_inverse=True)
-        mean = np.bincount(column, damage) / np.bincount(column)
-        return float(np.interp(-0.5, -mean, places))
+        return crack_front(self.crack)
 
     def columns(self, columns: Columns) -> Columns:
         """Opening and force of the whole width, and the crack front. Collective."""
