@@ -1,8 +1,15 @@
 """cutsim: cutting, tearing and blade penetration of soft solids on FEniCSx."""
 
 from cutsim.cohesive import Bilinear, CohesiveLaw, Exponential
-from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.conduction import HeatBody
+from cutsim.contact import PenaltyContact
+from cutsim.contact_heat import AdiabaticTool, ContactHeat
+from cutsim.crack_friction import CrackFriction
+from cutsim.friction import Coulomb, FrictionLaw, SmoothCoulomb
+from cutsim.heat_loads import Convection, HeatFlux, PrescribedTemperature
+from cutsim.heat_transfer import HeatTransfer
 from cutsim.interface import Crack
+from cutsim.interface_heat import InterfaceHeat
 from cutsim.loads import Support, Traction
 from cutsim.materials import LinearElastic, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff
 from cutsim.mechanics import Mechanics
@@ -11,23 +18,36 @@ from cutsim.points import Surface
 from cutsim.schemes import GeneralisedAlpha, Newmark
 from cutsim.solid import Solid
 from cutsim.space import cracked_space
+from cutsim.staggered import ThermoMechanics
 from cutsim.state import State
 from cutsim.stepping import StepControl, StepError, StepReport, run
+from cutsim.temperature import Temperature
+from cutsim.thermoelastic import ThermoElastic
 from cutsim.tool_contact import ToolContact
+from cutsim.tool_heat import ToolHeat
 from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AdiabaticTool",
     "Ball",
     "Bilinear",
     "Blade",
     "CohesiveLaw",
+    "ContactHeat",
+    "Convection",
     "Coulomb",
     "Crack",
+    "CrackFriction",
     "Exponential",
     "FlatPunch",
+    "FrictionLaw",
     "GeneralisedAlpha",
+    "HeatBody",
+    "HeatFlux",
+    "HeatTransfer",
+    "InterfaceHeat",
     "LinearElastic",
     "Material",
     "Mechanics",
@@ -37,6 +57,8 @@ __all__ = [
     "Path",
     "PenaltyContact",
     "Plane",
+    "PrescribedTemperature",
+    "SmoothCoulomb",
     "Solid",
     "StVenantKirchhoff",
     "State",
@@ -46,7 +68,11 @@ __all__ = [
     "Support",
     "Surface",
     "TaggedMesh",
+    "Temperature",
+    "ThermoElastic",
+    "ThermoMechanics",
     "ToolContact",
+    "ToolHeat",
     "Traction",
     "cracked_space",
     "read_geo",

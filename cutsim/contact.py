@@ -1,4 +1,4 @@
-"""Contact laws: normal pressure against penetration, and friction on a rigid tool (docs/theory.md §3, 3.3, 4)."""
+"""Contact laws: normal pressure against penetration (docs/theory.md §3, 4)."""
 
 from dataclasses import dataclass
 
@@ -55,27 +55,3 @@ class PenaltyContact:
         quadratic = self.stiffness * s**3 / (12 * c)
         linear = self.stiffness * (0.5 * (s - c) ** 2 + c**2 / 6)
         return ufl.conditional(ufl.lt(s, 0), 0.0, ufl.conditional(ufl.lt(s, 2 * c), quadratic, linear))
-
-
-@dataclass(frozen=True)
-class Coulomb:
-    """Coulomb friction t = −μ p s/√(|s|² + s₀²), regularised over a small slip s₀.
-
-    Args:
-        mu: Friction coefficient μ ≥ 0 [–].
-        slip: Slip s₀ > 0 in one step below which the traction is proportional to the slip [length].
-
-    Raises:
-        ValueError: A value is outside its range.
-    """
-
-    mu: float
-    slip: float
-
-    def __post_init__(self) -> None:
-        require("mu", self.mu, self.mu >= 0, ">= 0")
-        require("slip", self.slip, self.slip > 0, "> 0")
-
-    def traction(self, pressure: Expr, slip: Expr) -> Expr:
-        """Friction traction on the body [stress], against its slip relative to the tool [length]."""
-        return -self.mu * pressure * slip / ufl.sqrt(ufl.dot(slip, slip) + self.slip**2)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from cutsim.checks import require
 from cutsim.cohesive import CohesiveLaw, separation_curve
-from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.contact import PenaltyContact
+from cutsim.friction import Coulomb
 from cutsim.interface import Crack
 from cutsim.loads import Support
 from cutsim.materials import Material
@@ -108,7 +109,7 @@ class BladeCut:
         warn_coarse("blade", blade, crack.size)
         tip = _TIP_IN_NOTCH * notch
         contact = PenaltyContact.automatic(material.young, crack.normal_size, _PENALTY, blend=_BLEND * blade.tip_radius)
-        coulomb = Coulomb(friction, 1e-3 * crack.size) if friction else None
+        coulomb = Coulomb(friction) if friction else None
 
         def half(side: int, face: Literal["+", "-"], name: str) -> ToolContact:
             top = Surface.exterior(state, domain.facets(f"top_{name}"))

@@ -168,7 +168,8 @@ class Crack(Term):
         slide = jump - gap * n
         opening = ufl.conditional(ufl.ge(gap, 0), gap, 0.0)
         multiplier = self.points.at(self._multiplier) / contact.stiffness if self._allowed_penetration else 0.0
-        fade = ufl.exp(-((ufl.dot(jump, jump) / self._range**2) ** 2))
+        far = ufl.dot(jump, jump) / self._range**2 - 1
+        fade = ufl.conditional(ufl.gt(far, 0), ufl.exp(-(far**2)), 1.0)
         pressure = fade * contact.pressure(multiplier - gap)
         if law is None:
             none, whole = ufl.as_ufl(0.0), (ufl.as_ufl(1.0), ufl.as_ufl(1.0))

@@ -7,6 +7,7 @@ Interface vectors keep the geometric dimension of the mesh.
 from typing import Any
 
 import ufl
+from ufl.geometry import FacetJacobian
 
 Expr = Any  # UFL ships no type stubs; every symbolic argument and result has this name
 
@@ -85,7 +86,7 @@ def surface_frame(u: Expr, mesh: Any, n: Expr, *, current: bool) -> tuple[Expr, 
     """
     if len(n) == 2:
         return (ufl.as_vector([-n[1], n[0]]),)
-    edge = ufl.FacetJacobian(mesh)("+")[:, 0]
+    edge = FacetJacobian(mesh)("+")[:, 0]
     if current:
         edge = edge + 0.5 * (ufl.grad(u)("+") + ufl.grad(u)("-")) * edge
     first = edge / ufl.sqrt(ufl.dot(edge, edge))

@@ -1,20 +1,24 @@
 """A rigid tool in the body: contact on outer surfaces and crack faces, friction, reactions (docs/theory.md §4)."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
+from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
-from cutsim.assembly import global_dot, integrate, moment, nodal_forces, resultant
+from cutsim.assembly import integrate, moment, nodal_forces, resultant
 from cutsim.checks import require
 from cutsim.compat import form
-from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.contact import PenaltyContact
+from cutsim.friction import FrictionLaw
 from cutsim.kinematics import Expr, tangential
 from cutsim.parameters import with_constants
-from cutsim.points import Surface
+from cutsim.points import Surface, Values
+from cutsim.slip import SlipHistory, completed
 from cutsim.state import State
 from cutsim.terms import Term
 from cutsim.tools import Path, Shape
@@ -22,6 +26,76 @@ from cutsim.tools import Path, Shape
 logger = logging.getLogger(__name__)
 
 _AXES = "xyz"
+
+
+class Patch:
+    """A rigid tool on one surface: gap, pressure, friction.
+
+    Args:
+        state: Displacement and time.
+        surface: The surface.
+        shape: Signed distance of the tool.
+        position: Its present position.
+        contact: Contact law.
+        friction: Friction law with a tangential penalty, or None.
+        temperature: Temperature of the body, for friction laws that depend on it.
+
+    Attributes:
+        surface: The surface.
+        slip: Memory of friction, None without friction.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        surface: Surface,
+        shape: Shape,
+        position: fem.Constant,
+        contact: PenaltyContact,
+        friction: FrictionLaw | None,
+        temperature: fem.Function | None,
+    ) -> None:
+        self.surface = surface
+        place = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
+        x = ufl.variable(place)
+        self._normal = ufl.diff(shape.distance(x), x)
+        self._contact = with_constants(state.mesh, contact)
+        self._penetration = -shape.distance(place)
+        self._pressure = self._contact.pressure(self._penetration)
+        self.slip: SlipHistory | None = None
+        if friction is not None:
+            self.slip = SlipHistory(
+                state,
+                surface.points,
+                friction,
+                surface.restrict(state.u) - position,
+                self._pressure,
+                project=lambda slip: tangential(slip, self._normal),
+                temperature=None if temperature is None else surface.restrict(temperature),
+            )
+
+    def virtual_work(self, v: Expr) -> ufl.Form:
+        """Virtual work −∫ (p ∇d − t)·v of pressure and friction on the body."""
+        traction = self._pressure * self._normal
+        if self.slip is not None:
+            traction -= self.slip.traction
+        return -ufl.dot(traction, self.surface.restrict(v)) * self.surface.measure
+
+    def energy(self) -> ufl.Form:
+        """Energy of the contact penalty."""
+        return self._contact.energy(self._penetration) * self.surface.measure
+
+    @cached_property
+    def _evaluate(self):  # type: ignore[no-untyped-def]
+        return self.surface.points.evaluator({"pressure": self._pressure})
+
+    def pressure(self) -> Values:
+        """Present contact pressure at the points [stress]. Collective."""
+        return self._evaluate()["pressure"]
+
+    def dissipation(self) -> Values:
+        """Friction dissipation of the trial step at the points [energy per reference area]."""
+        return np.zeros_like(self.surface.points.weights) if self.slip is None else self.slip.dissipation()
 
 
 class ToolContact(Term):
@@ -33,8 +107,14 @@ class ToolContact(Term):
         path: Motion of its reference point.
         surfaces: Surfaces the tool can touch; each side of a crack by itself.
         contact: Contact law; the pressure acts per reference area.
-        friction: Friction law against the slip relative to the tool, None for a frictionless tool.
+        friction: Friction law against the slip relative to the tool, None for a frictionless tool; without a tangential
+            penalty of its own it takes that of the contact law.
+        temperature: Temperature of the body, for friction laws that depend on it.
         name: Name in messages and output.
+
+    Attributes:
+        patches: The tool on each surface.
+        position: Present position of the tool.
 
     Raises:
         ValueError: No surface is given, or the path has another dimension than the mesh.
@@ -48,7 +128,8 @@ class ToolContact(Term):
         surfaces: Sequence[Surface],
         *,
         contact: PenaltyContact,
-        friction: Coulomb | None = None,
+        friction: FrictionLaw | None = None,
+        temperature: fem.Function | None = None,
         name: str = "tool",
     ) -> None:
         gdim = state.mesh.geometry.dim
@@ -57,22 +138,21 @@ class ToolContact(Term):
         require("path", start.shape, start.shape == (gdim,), f"positions of {gdim} components")
         self.name, self.state, self.shape, self.path = name, state, shape, path
         self.contact, self.friction = contact, friction
-        self._contact = with_constants(state.mesh, contact)
-        self._coulomb = None if friction is None else with_constants(state.mesh, friction)
         self.symmetric = friction is None
-        self._surfaces = tuple(surfaces)
         self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
-        self.position_old = fem.Constant(state.mesh, start.astype(default_scalar_type))
-        v = ufl.TestFunction(state.V)
-        self._energy_form = form(self._sum(lambda s: self._contact.energy(-self._distance(s))))
-        self._contact_form = form(self.residual(v))
-        self._friction_form = (
-            form(self._sum(lambda s: -ufl.dot(self._friction(s), s.restrict(v)))) if friction else None
-        )
-        zero: NDArray[np.float64] = np.zeros(len(state.increment))
-        self._forces, self._forces_old = zero, zero.copy()
-        self._rubbing, self._rubbing_old = zero, zero.copy()
-        self._friction_work = self._friction_work_old = 0.0
+        self._position_old = start.copy()
+        law = None if friction is None else completed(friction, contact.stiffness)
+        self.patches = tuple(Patch(state, s, shape, self.position, contact, law, temperature) for s in surfaces)
+        self._slips = [p.slip for p in self.patches if p.slip is not None]
+        self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
+        self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
+        self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
+        self._forces_old: NDArray[np.float64] = self._forces
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+        """Maps from facets of the mesh to the points of the surfaces."""
+        return {mesh: cells for p in self.patches for mesh, cells in p.surface.points.entity_maps.items()}
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -82,18 +162,11 @@ class ToolContact(Term):
     @property
     def displacement(self) -> NDArray[np.float64]:
         """Increment of the tool's position in the step [length]."""
-        return np.asarray(self.position.value - self.position_old.value)
+        return np.asarray(self.position.value - self._position_old)
 
     def residual(self, v: Expr) -> ufl.Form:
-        """Virtual work −∫ (p ∇d + t)·v of pressure and friction on the body."""
-
-        def density(surface: Surface) -> Expr:
-            traction = self._pressure(surface) * self._normal(surface)
-            if self.friction is not None:
-                traction += self._friction(surface)
-            return -ufl.dot(traction, surface.restrict(v))
-
-        return self._sum(density)
+        """Virtual work of pressure and friction on the body."""
+        return sum((p.virtual_work(v) for p in self.patches), start=ufl.Form([]))
 
     def begin(self, time: float) -> None:
         """Move the tool to its position at the end of the step."""
@@ -101,23 +174,24 @@ class ToolContact(Term):
 
     def rollback(self) -> None:
         """Move the tool back to the start of the step."""
-        self.position.value[:] = self.position_old.value
-        self._forces, self._rubbing = self._forces_old, self._rubbing_old
-        self._friction_work = self._friction_work_old
+        self.position.value[:] = self._position_old
+        self._forces = self._forces_old
+        for slip in self._slips:
+            slip.rollback()
 
     def evaluate(self) -> None:
-        """Contact forces of the trial state and friction work of the step (trapezoidal). Collective."""
+        """Contact forces, slip and friction work of the trial state. Collective."""
         self._forces = nodal_forces(self._contact_form)
-        if self._friction_form is not None:
-            self._rubbing = nodal_forces(self._friction_form)
-            mean = 0.5 * (self._rubbing + self._rubbing_old)
-            dissipated = global_dot(self.state.mesh.comm, mean, self.state.increment)
-            dissipated -= float(self._resultant(mean) @ self.displacement)
-            self._friction_work = self._friction_work_old + dissipated
+        for slip in self._slips:
+            slip.evaluate()
 
     def energies(self) -> dict[str, float]:
-        """Energy of the contact penalty and friction work so far. Collective."""
-        return {"contact": integrate(self._energy_form), "friction": self._friction_work}
+        """Energy of the contact penalties and friction work so far. Collective."""
+        total = {"contact": integrate(self._energy_form), "friction": 0.0}
+        for slip in self._slips:
+            for entry, value in slip.energies().items():
+                total[entry] += value
+        return total
 
     def external_work(self) -> float:
         """Work of the tool on the body in the step: mean force times increment. Collective."""
@@ -143,38 +217,21 @@ class ToolContact(Term):
         columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
         axes = _AXES if gdim == 3 else "z"
         columns |= {f"{self.name}_moment_{a}": (float(m), "moment") for a, m in zip(axes, couple, strict=True)}
+        if self._slips:
+            sticks, slips = np.sum([slip.areas() for slip in self._slips], axis=0)
+            kind = "length" if gdim == 2 else "area"
+            columns |= {f"{self.name}_sticking": (float(sticks), kind), f"{self.name}_slipping": (float(slips), kind)}
         return columns
 
     def commit(self) -> None:
-        """Adopt position, forces and friction work."""
-        self.position_old.value[:] = self.position.value
-        self._forces_old, self._rubbing_old = self._forces, self._rubbing
-        self._friction_work_old = self._friction_work
+        """Adopt position, forces and slip."""
+        self._position_old[:] = self.position.value
+        self._forces_old = self._forces
+        for slip in self._slips:
+            slip.commit()
 
     def _resultant(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         return resultant(self.state.mesh.comm, forces, self.state.mesh.geometry.dim)
-
-    def _sum(self, density) -> ufl.Form:  # type: ignore[no-untyped-def]
-        return sum((density(s) * s.measure for s in self._surfaces), start=ufl.Form([]))
-
-    def _place(self, surface: Surface) -> Expr:
-        X = ufl.SpatialCoordinate(self.state.mesh)
-        return surface.restrict(X + self.state.u) - self.position
-
-    def _distance(self, surface: Surface) -> Expr:
-        return self.shape.distance(self._place(surface))
-
-    def _normal(self, surface: Surface) -> Expr:
-        x = ufl.variable(self._place(surface))
-        return ufl.diff(self.shape.distance(x), x)
-
-    def _pressure(self, surface: Surface) -> Expr:
-        return self._contact.pressure(-self._distance(surface))
-
-    def _friction(self, surface: Surface) -> Expr:
-        assert self._coulomb is not None
-        moved = surface.restrict(self.state.u - self.state.u_old) - (self.position - self.position_old)
-        return self._coulomb.traction(self._pressure(surface), tangential(moved, self._normal(surface)))
 
 
 def warn_coarse(name: str, shape: Shape, facet_size: float) -> None:

@@ -11,12 +11,13 @@ SOURCES = Path(cutsim.__file__).parent
 # a module imports from its own layer and those before it
 LAYERS = [
     {"checks", "kinematics", "measures", "compat", "assembly", "options", "parameters", "sizes", "units"},
-    {"materials", "cohesive", "contact", "tools", "schemes", "meshing", "space"},
-    {"state", "terms", "points", "preconditioners", "tangent"},
+    {"materials", "cohesive", "contact", "friction", "tools", "schemes", "thermoelastic", "meshing", "space"},
+    {"state", "terms", "points", "slip", "temperature", "preconditioners", "tangent"},
+    {"heat_balance", "contact_heat", "heat_exchange"},
     {"interface", "solid", "loads", "solver"},
-    {"tool_contact", "inertia", "energy"},
-    {"mechanics"},
-    {"stepping", "fracture"},
+    {"tool_contact", "inertia", "crack_friction", "energy", "conduction", "heat_loads", "interface_heat"},
+    {"mechanics", "tool_heat", "heat_transfer"},
+    {"stepping", "staggered", "fracture"},
 ]
 
 

@@ -10,7 +10,8 @@ from mpi4py import MPI
 from cutsim.assembly import integrate
 from cutsim.cohesive import Exponential
 from cutsim.compat import form
-from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.contact import PenaltyContact
+from cutsim.friction import SmoothCoulomb
 from cutsim.interface import Crack
 from cutsim.loads import Support, Traction
 from cutsim.materials import NeoHookean
@@ -31,7 +32,7 @@ def pried_and_pressed(comm=MPI.COMM_WORLD, n=6, gdim=2, **options):
     start = np.append(np.full(gdim - 1, 0.25), 1.32)
     path = Path.polyline([0, 1], [start, start - 0.15 * np.eye(gdim)[up] + 0.05 * np.eye(gdim)[0]])
     surface = Surface.exterior(b.state, b.face(up, 1.0))
-    contact, friction = PenaltyContact(40.0, 0.02), Coulomb(0.2, 5e-3)
+    contact, friction = PenaltyContact(40.0, 0.02), SmoothCoulomb(0.2, 5e-3)
     ball = ToolContact(b.state, Ball(0.3), path, [surface], contact=contact, friction=friction, name="ball")
     supports = [Support(b.state, b.face(up, 0.0), i) for i in range(gdim)]
     edge = mesh.locate_entities_boundary(b.state.mesh, gdim - 1, lambda x: np.isclose(x[0], 1) & (x[up] > 0.5 - 1e-9))

@@ -10,7 +10,9 @@ from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_matrix
 
 from cutsim.compat import form
-from cutsim.contact import Coulomb, PenaltyContact
+from cutsim.contact import PenaltyContact
+from cutsim.crack_friction import CrackFriction
+from cutsim.friction import Coulomb, SmoothCoulomb
 from cutsim.materials import LinearElastic, MooneyRivlin, NeoHookean, StVenantKirchhoff
 from cutsim.points import Surface
 from cutsim.tool_contact import ToolContact
@@ -187,10 +189,50 @@ def test_blended_and_augmented_contact(opening):
     assert_slope_two(crack, b.state, separated(b, 0.01, opening, 1e-4), 0.05)
 
 
+STATES = {
+    "stick": (Coulomb(20.0, 30.0), None, "compression"),
+    "slip": (Coulomb(0.4, 1e4), None, "compression"),
+    "viscous slip": (Coulomb(0.4, 50.0, viscosity=2.0), None, "compression"),
+    "slip beside a bond": (Coulomb(0.4, 1e4), EXPONENTIAL, "compression of the damaged bond"),
+    "slip while the bond breaks": (Coulomb(0.4, 1e4), EXPONENTIAL, "breaking under compression"),
+}
+
+
+@pytest.mark.parametrize("normal", ["current", "reference"])
+@pytest.mark.parametrize("gdim", [2, 3])
+@pytest.mark.parametrize("case", STATES)
+def test_friction_on_a_crack(case, gdim, normal):
+    friction, law, jump = STATES[case]
+    sliding, opening, kappa = {**JUMPS, "breaking under compression": (1.7, -0.3, 1.0)}[jump]
+    b = make_blocks(gdim)
+    b.state.begin(0.7)
+    crack = b.crack(law, normal=normal, contact=PenaltyContact(30.0))
+    crack._kappa.x.array[:] = kappa * 0.1
+    term = CrackFriction(crack, friction)
+    u = separated(b, sliding * 0.1, opening * 0.1, 1e-3)
+    if normal == "reference" and (case == "stick" or (gdim == 2 and jump != "breaking under compression")):
+        # linear in u, since neither the direction of the traction nor the broken fraction changes
+        assert Linearised(term, b.state).remainders(u, jump_part(b.state, 8, 0.02), [1e-2])[0] < 1e-9
+    else:
+        asymmetry = assert_slope_two(term, b.state, u, 0.02)
+        assert case == "stick" or asymmetry > 1e-3
+
+
+@pytest.mark.parametrize("acts_on", ["contact", "thesis"])
+def test_friction_on_an_intact_bond(acts_on):
+    b = make_blocks()
+    crack = b.crack(EXPONENTIAL, contact=PenaltyContact(30.0))
+    term = CrackFriction(crack, Coulomb(0.4, 1e4), acts_on=acts_on)
+    opening = 0.05 if acts_on == "thesis" else -0.03
+    assert_slope_two(term, b.state, separated(b, 0.07, opening, 1e-3), 0.1)
+
+
 # -- tools ------------------------------------------------------------------------------------------------------------
 
 CONTACT = PenaltyContact(40.0, blend=0.02)
-FRICTION = Coulomb(0.3, 0.01)
+FRICTION = SmoothCoulomb(0.3, 0.01)
+# all points stick, or all slip: between the two the forces have a kink
+FRICTIONS = {"smooth": None, "regularised": FRICTION, "slip": Coulomb(0.3, 1e3), "stick": Coulomb(50.0, 5.0)}
 # shape, and a reference point from which it dips into the plane y = 1 (z = 1) at different depths along it
 SHAPES = {
     "blade": (Blade(0.4, 0.3, 0.6), (0.4, 0.9)),
@@ -208,12 +250,14 @@ SHAPES = {
 
 def touch(b, shape, place, surfaces, friction):
     """Contact with a tool that moved a little in the step."""
-    tool = ToolContact(b.state, shape, Path(lambda t: np.array(place)), surfaces, contact=CONTACT, friction=friction)
-    tool.position_old.value[0] += 0.05
+    before = np.array(place) + np.eye(len(place))[0] * 0.05
+    path = Path.polyline([0.0, 1.0], [before, place])
+    tool = ToolContact(b.state, shape, path, surfaces, contact=CONTACT, friction=friction)
+    tool.begin(1.0)
     return tool
 
 
-@pytest.mark.parametrize("friction", [None, FRICTION], ids=["smooth", "rough"])
+@pytest.mark.parametrize("friction", FRICTIONS.values(), ids=FRICTIONS)
 @pytest.mark.parametrize("shape", SHAPES)
 def test_tool_on_outer_surface(shape, friction):
     shape, place = SHAPES[shape]
@@ -222,7 +266,8 @@ def test_tool_on_outer_surface(shape, friction):
     surface = Surface.exterior(b.state, b.face(gdim - 1, 1.0))
     tool = touch(b, shape, place, [surface], friction)
     asymmetry = assert_slope_two(tool, b.state, smooth(b.state.V, 4, 0.02), 0.05)
-    assert friction is None or asymmetry > 1e-3
+    sticks_to_a_plane = friction is FRICTIONS["stick"] and isinstance(shape, Plane)
+    assert friction is None or sticks_to_a_plane or asymmetry > 1e-3
 
 
 @pytest.mark.parametrize("depth", [-0.02, 0.02, 0.1], ids=["below", "within", "beyond"])
@@ -238,7 +283,7 @@ def test_blend(depth):
         assert_slope_two(tool, b.state, u, 0.05)
 
 
-@pytest.mark.parametrize("friction", [None, FRICTION], ids=["smooth", "rough"])
+@pytest.mark.parametrize("friction", FRICTIONS.values(), ids=FRICTIONS)
 def test_tool_between_crack_faces(friction):
     """Each half blade on its face: u('+') and u('−') are not mixed up."""
     b = make_blocks()
