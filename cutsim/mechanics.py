@@ -95,8 +95,8 @@ class Mechanics:
 
     @property
     def fields(self) -> Mapping[str, Expr]:
-        """Fields beside the displacement for output, by name."""
-        return {}
+        """Fields beside the displacement for output, by name: the velocity of a dynamic analysis."""
+        return {} if self.inertia is None else {"velocity": self.inertia.velocity}
 
     @property
     def corners(self) -> tuple[float, ...]:

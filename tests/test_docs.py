@@ -55,6 +55,12 @@ def test_user_guide(tmp_path, monkeypatch):
     assert {path.name for path in (tmp_path / "results").iterdir()} >= {"history.csv", "displacement.bp", "force.png"}
 
 
+def test_dynamics():
+    momenta = run_page("dynamics")["momenta"]
+    assert len(momenta) > 50
+    np.testing.assert_allclose(momenta, [momenta[0]] * len(momenta), atol=1e-7 * np.linalg.norm(momenta[0]))
+
+
 # -- material ---------------------------------------------------------------------------------------------------------
 
 

@@ -86,7 +86,15 @@ def test_audit_adds_up():
     assert later.closure == pytest.approx(0.125), "relative to the largest turnover, not the present one"
     assert audit.entries["strain"] == 1.5, "an audit is a value: a rejected step leaves no trace"
     assert EnergyAudit().closure == 0.0
-    assert set(audit.record()) == {"work_external", "energy_initial", "energy_closure"} | {f"energy_{n}" for n in ENTRIES}
+    entries = {f"energy_{name}" for name in ENTRIES}
+    assert set(audit.record()) == {"work_external", "energy_initial", "energy_closure"} | entries
+
+
+def test_audit_of_a_state_that_starts_with_energy():
+    audit = EnergyAudit().start([{"kinetic": 3.0, "strain": 1.0}])
+    assert audit.initial == 4.0
+    assert audit.closure == 0.0
+    assert audit.advance(1.0, [{"kinetic": 4.0}]).closure == pytest.approx(0.2)
 
 
 def test_scale_keeps_small_energies_from_looking_unbalanced():
