@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from cutsim.temperature import Temperature
 from cutsim.terms import Term
 
-#: Entries of the heat audit: what is generated, and what becomes of it.
-GENERATED = ("friction", "fracture", "source")
+#: Entries of the heat audit: where heat comes from, and what becomes of it.
+GAINED = ("friction", "fracture", "source", "inflow")
 SPENT = ("stored", "outflow")
 
 
@@ -23,7 +23,7 @@ class HeatTerm(Term):
         self.temperature, self.state, self.name = temperature, temperature.state, name
 
     def heat(self) -> dict[str, float]:
-        """Heat of the trial step by entry of the audit [energy]. Collective."""
+        """Heat of the trial step by entry of the audit [energy]; a negative outflow is an inflow. Collective."""
         return {}
 
 
@@ -32,12 +32,12 @@ class HeatBalance:
     """Heat since the start of a run [energy].
 
     Attributes:
-        entries: Heat from friction, fracture and sources; heat stored in bodies and interfaces, and heat that has left
-            through boundaries and tools.
+        entries: Heat from friction, fracture and sources, heat that has come in through boundaries and tools; heat
+            stored in bodies and interfaces, and heat that has left through boundaries and tools.
         scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with.
     """
 
-    entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys((*GENERATED, *SPENT), 0.0))
+    entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys((*GAINED, *SPENT), 0.0))
     scale: float = 0.0
 
     def advance(self, heats: Iterable[Mapping[str, float]]) -> "HeatBalance":
@@ -49,14 +49,15 @@ class HeatBalance:
         entries = dict(self.entries)
         for contribution in heats:
             for name, value in contribution.items():
-                entries[name] += value
-        turnover = max(sum(abs(entries[name]) for name in names) for names in (GENERATED, SPENT))
+                inward = name == "outflow" and value < 0
+                entries["inflow" if inward else name] += abs(value) if inward else value
+        turnover = max(sum(abs(entries[name]) for name in names) for names in (GAINED, SPENT))
         return replace(self, entries=entries, scale=max(self.scale, turnover))
 
     @property
     def closure(self) -> float:
-        """(heat generated − stored − left) / largest turnover so far [–]."""
-        gap = sum(self.entries[name] for name in GENERATED) - sum(self.entries[name] for name in SPENT)
+        """(heat gained − stored − left) / largest turnover so far [–]."""
+        gap = sum(self.entries[name] for name in GAINED) - sum(self.entries[name] for name in SPENT)
         return gap / self.scale if self.scale > 0 else 0.0
 
     def record(self) -> dict[str, tuple[float, str]]:

@@ -145,7 +145,7 @@ def test_heat_is_conserved():
     supplied = np.cumsum(0.1 * (0.5 * (1 + times) + 2 * times))
     stored = RHO * C / 2 * (rows["lower_temperature"] - 300 + 2 * (rows["upper_temperature"] - 300))
     np.testing.assert_allclose(stored, supplied, rtol=1e-9)
-    np.testing.assert_allclose(rows["heat_source"] - rows["heat_outflow"], supplied, rtol=1e-9)
+    np.testing.assert_allclose(rows["heat_source"] + rows["heat_inflow"], supplied, rtol=1e-9)
     assert np.abs(rows["heat_closure"]).max() < 1e-9
 
 
