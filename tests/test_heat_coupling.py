@@ -8,12 +8,13 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 from test_tangents import assert_slope_two, smooth
 
+from cutsim.cohesive import Exponential
 from cutsim.conduction import HeatBody
 from cutsim.contact import PenaltyContact
 from cutsim.contact_heat import ContactHeat
 from cutsim.crack_friction import CrackFriction
 from cutsim.friction import Coulomb
-from cutsim.heat_loads import PrescribedTemperature
+from cutsim.heat_loads import Convection, PrescribedTemperature
 from cutsim.heat_transfer import HeatTransfer
 from cutsim.interface_heat import InterfaceHeat
 from cutsim.loads import Support
@@ -195,12 +196,12 @@ def test_iteration_settles_what_one_pass_lags_behind():
 # -- friction ---------------------------------------------------------------------------------------------------------
 
 
-def rubbing(gdim=2, law=None, mu=0.3, comm=MPI.COMM_WORLD, capacity=2.0, n=4):
+def rubbing(gdim=2, law=None, coulomb=None, comm=MPI.COMM_WORLD, capacity=2.0, hot=None):
     """A block pressed on another and slid by less than an element."""
-    b = make_blocks(gdim, n, comm)
+    b = make_blocks(gdim, 4, comm)
     T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
     crack = b.crack(None, contact=PenaltyContact(50.0))
-    friction = CrackFriction(crack, Coulomb(mu, stiffness=1e4))
+    friction = CrackFriction(crack, coulomb or Coulomb(0.3, stiffness=1e4), temperature=T.value)
     law = law or ContactHeat(3.0, 1.0)
     times = (0.0, 1.0, 3.0)
     moved = [
@@ -216,7 +217,9 @@ def rubbing(gdim=2, law=None, mu=0.3, comm=MPI.COMM_WORLD, capacity=2.0, n=4):
         HeatBody(T, density=1.0, capacity=capacity, conductivity=0.5, body=cells, name=name)
         for name, cells in (("lower", b.lower), ("upper_body", b.upper))
     ]
-    return ThermoMechanics(mechanics, HeatTransfer(T, [*bodies, InterfaceHeat(T, crack, law, friction)]))
+    contact = InterfaceHeat(T, crack, law, friction)
+    held = [] if hot is None else [PrescribedTemperature(T, b.upper, hot, dim=gdim)]
+    return ThermoMechanics(mechanics, HeatTransfer(T, [*bodies, contact], held))
 
 
 @pytest.mark.mpi
@@ -237,6 +240,51 @@ def test_block_on_block_shares_by_conductance():
     rows = history(rubbing(capacity=1e9), 3.0, StepControl.fixed(0.1))
     plus, minus = rows["crack_heat_flow_plus"][-1], rows["crack_heat_flow_minus"][-1]
     assert minus < 0 and plus / minus == pytest.approx(3.0, rel=1e-4)
+
+
+def test_friction_falls_with_temperature():
+    """μ(T) = μ (T_d − T)²/(T_d − T_ref)² of the hotter side (thesis B.21): a quarter of it half way to T_d."""
+    problem = rubbing(coulomb=Coulomb(0.3, stiffness=1e4, T_ref=300.0, T_damage=500.0), hot=lambda t: 200 + 100 * t)
+    rows = history(problem, 3.0, StepControl.fixed(0.125))
+    rate = np.diff(rows["energy_friction"]) / np.diff(rows["time"])
+    temperature = rows["temperature_max"][:-1]  # a step slides at the temperature of its start
+    expected = 0.3 * 50 * 0.02 * 0.05 * ((500 - temperature) / 200) ** 2
+    assert rate[-1] == pytest.approx(0.5 * (expected[-1] + expected[-2]), rel=1e-3)
+
+
+# -- everything on ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.mpi
+def test_all_books_close():
+    """Inertia, viscosity, a bond that breaks in shear, friction on what is broken, expansion and all kinds of heat."""
+    b = make_blocks(2, 4)
+    T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
+    expansion = ThermoElastic(1e-4, 300.0, softening=-1e-3)
+    law = Exponential.from_parameters(toughness=4e-4, opening=0.01, shear_toughness=2e-4, shear_opening=0.02)
+    crack = b.crack(law, contact=PenaltyContact(50.0))
+    friction = CrackFriction(crack, Coulomb(0.3, stiffness=100.0))
+    solid = b.solid(
+        NeoHookean(E, NU), thermoelastic=expansion, temperature=T, density=0.01, viscosity=0.01, volumetric="full"
+    )
+    times = (0.0, 1.0, 4.0)
+    supports = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
+    supports.append(
+        Support(b.state, b.face(1, 1.0), 1, lambda t: np.interp(t, times, (0, -0.02, -0.02)), corners=(1.0,))
+    )
+    supports.append(Support(b.state, b.face(1, 1.0), 0, lambda t: np.interp(t, times, (0, 0, 0.1))))
+    mechanics = Mechanics(b.state, [solid, crack, friction], supports, analysis="dynamic")
+    body = HeatBody(T, capacity=0.2, conductivity=0.5, body=solid)
+    contact = InterfaceHeat(T, crack, ContactHeat(3.0, 1.0, capacity=1e-3, fracture_fraction=0.9), friction)
+    heat = HeatTransfer(T, [body, contact, Convection(T, b.face(0, 0.0), 0.01, 290.0)])
+    rows = history(ThermoMechanics(mechanics, heat), 4.0, StepControl.fixed(0.02))
+    assert np.abs(rows["energy_closure"]).max() < 0.01
+    assert np.abs(rows["heat_closure"]).max() < 1e-9
+    for name in ("energy_kinetic", "energy_fracture", "energy_friction", "energy_viscous", "energy_thermoelastic"):
+        assert np.abs(rows[name]).max() > 0, name
+    np.testing.assert_allclose(rows["heat_friction"], rows["energy_friction"], rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(rows["heat_fracture"], 0.9 * rows["energy_fracture"], rtol=1e-9, atol=1e-15)
+    assert np.diff(rows["crack_entropy"]).min() > -1e-15
 
 
 # -- two phases -------------------------------------------------------------------------------------------------------
