@@ -178,6 +178,7 @@ class Inertia(Term):
             old: Owned forces R + M a at the start of the step.
         """
         s = self.scheme
+        # R₀ is old − M a₀
         weights = s.alpha_f / (1 - s.alpha_f), (s.alpha_m - s.alpha_f) / (1 - s.alpha_f)
         return weights[0] * old + weights[1] * self._books_old.forces
 
