@@ -17,7 +17,7 @@ from cutsim.solver import NonlinearProblem, Outcome
 from cutsim.temperature import Temperature
 
 #: Smallest turnover to which the closure of the audit refers, as a fraction of the heat of all bodies above absolute
-#: zero: what is left of the digits of that heat after rounding is then below 1e-9 of it.
+#: zero. The tolerance of the solver, relative to that heat, then stays invisible while nothing happens.
 SMALLEST_HEAT = 1e-6
 
 # problems that live in one process must not share PETSc options

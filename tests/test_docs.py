@@ -61,6 +61,15 @@ def test_dynamics():
     np.testing.assert_allclose(momenta, [momenta[0]] * len(momenta), atol=1e-7 * np.linalg.norm(momenta[0]))
 
 
+def test_heat():
+    rows = run_page("heat")["rows"]
+    last = {name: value for name, (value, _) in rows[-1].items()}
+    assert last["heat_friction"] == pytest.approx(last["energy_friction"], rel=1e-9)
+    assert last["temperature_max"] > last["lower_temperature"] > 293
+    assert abs(last["heat_closure"]) < 1e-8
+    assert abs(last["energy_closure"]) < 0.01
+
+
 # -- material ---------------------------------------------------------------------------------------------------------
 
 
