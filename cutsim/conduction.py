@@ -33,6 +33,9 @@ class HeatBody(HeatTerm):
         source: Heat source r per reference volume, a number or a function of time [power/volume].
         name: Name in messages and output.
 
+    Attributes:
+        dofs: Local dofs of the temperature in the body.
+
     Raises:
         ValueError: A parameter is outside its range.
     """
@@ -69,7 +72,7 @@ class HeatBody(HeatTerm):
         self._volume = integrate(form(one * self._dx_storage))
         self._mean_form = form(temperature.value * self._dx_storage)
         self._stored_form = form(self._heat_capacity * (temperature.value - temperature.old) * self._dx_storage)
-        self._dofs = _dofs_of(temperature.space, cells)
+        self.dofs = _dofs_of(temperature.space, cells)
 
     @property
     def content(self) -> float:
@@ -95,7 +98,7 @@ class HeatBody(HeatTerm):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Mean and highest temperature of the body. Collective."""
-        highest = float(self.temperature.value.x.array[self._dofs].max(initial=-np.inf))
+        highest = float(self.temperature.value.x.array[self.dofs].max(initial=-np.inf))
         return {
             f"{self.name}_temperature": (integrate(self._mean_form) / self._volume, "temperature"),
             f"{self.name}_temperature_max": (self.state.mesh.comm.allreduce(highest, op=MPI.MAX), "temperature"),

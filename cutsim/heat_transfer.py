@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import ufl
+from dolfinx import la
 from numpy.typing import NDArray
 
 from cutsim.checks import require
@@ -37,7 +38,7 @@ class HeatTransfer:
         rtol: Residual tolerance relative to the heat flows.
 
     Raises:
-        ValueError: There is no body, or two terms or prescribed temperatures share a name.
+        ValueError: A node has no body, or two terms or prescribed temperatures share a name.
     """
 
     def __init__(
@@ -52,7 +53,8 @@ class HeatTransfer:
     ) -> None:
         names = [t.name for t in terms] + [p.name for p in prescribed if p.name]
         bodies = [t for t in terms if isinstance(t, HeatBody)]
-        require("terms", names, len(bodies) > 0, "at least one HeatBody")
+        bare = _nodes_without(temperature, bodies)
+        require("terms", names, bare == 0, f"a HeatBody for every cell ({bare} nodes have none)")
         require("names", names, len(set(names)) == len(names), "different for all terms and prescribed temperatures")
         self.temperature, self.state = temperature, temperature.state
         self.terms, self.prescribed = tuple(terms), tuple(prescribed)
@@ -150,3 +152,14 @@ class HeatTransfer:
         self.temperature.commit()
         self.state.commit()
         self.audit, self._residual_old = self._trial_audit, self._residual
+
+
+def _nodes_without(temperature: Temperature, bodies: Sequence[HeatBody]) -> int:
+    """Number of nodes that belong to no body. Collective."""
+    index_map = temperature.space.dofmap.index_map
+    marks = la.vector(index_map)
+    for body in bodies:
+        marks.array[body.dofs] = 1.0
+    marks.scatter_reverse(la.InsertMode.add)
+    bare = int(np.sum(marks.array[: index_map.size_local] == 0))
+    return int(temperature.space.mesh.comm.allreduce(bare))

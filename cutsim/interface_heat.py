@@ -5,9 +5,12 @@ from typing import Protocol
 
 import numpy as np
 import ufl
+from dolfinx import fem
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.checks import require
 from cutsim.contact_heat import ContactHeat
 from cutsim.heat_balance import HeatTerm
 from cutsim.heat_exchange import HeatExchange
@@ -38,6 +41,9 @@ class InterfaceHeat(HeatTerm):
 
     Attributes:
         exchange: What is known of heat at the points of the crack.
+
+    Raises:
+        ValueError: The temperature has another state than the crack, or is continuous across it.
     """
 
     def __init__(
@@ -50,6 +56,8 @@ class InterfaceHeat(HeatTerm):
         name: str | None = None,
     ) -> None:
         super().__init__(temperature, name or crack.name)
+        require("crack", crack.name, crack.state is temperature.state, "a crack made with the state of the temperature")
+        require("temperature", crack.name, _is_cracked(temperature.space, crack), "on a space cracked along the crack")
         self.crack, self.law, self.friction = crack, law, friction
         T = temperature.value
         self.exchange = HeatExchange(temperature, crack.points, law, T("+"), T("-"), self.name)
@@ -100,3 +108,12 @@ class InterfaceHeat(HeatTerm):
     def commit(self) -> None:
         """Adopt interface temperature and entropy."""
         self.exchange.commit()
+
+
+def _is_cracked(V: fem.FunctionSpace, crack: Crack) -> bool:
+    """Whether the two sides of some facet of a crack have unknowns of their own. Collective."""
+    dofmap = V.dofmap
+    shared = len(dofmap.dof_layout.entity_closure_dofs(V.mesh.topology.dim - 1, 0))
+    pairs = crack.entities.reshape(-1, 4)[:, ::2]
+    split = any(len(np.intersect1d(dofmap.cell_dofs(a), dofmap.cell_dofs(b))) < shared for a, b in pairs)
+    return bool(V.mesh.comm.allreduce(split, op=MPI.LOR))

@@ -70,11 +70,6 @@ class Solid(Term):
         require("volumetric", volumetric, volumetric in ("auto", "full", "reduced"), "'auto', 'full' or 'reduced'")
         require("viscosity", viscosity, viscosity >= 0, ">= 0")
         require("density", density, density is None or density > 0, "> 0")
-        together = (thermoelastic is None) == (temperature is None)
-        require("temperature", temperature, together, "given with thermoelastic, and only then")
-        softens = thermoelastic is not None and thermoelastic.softening != 0
-        # there λ₃ would have to be solved for with another ratio of the moduli at each temperature
-        require("plane", plane, plane == "strain" or not softens, "'strain' for a shear modulus that varies with heat")
         self.name = name
         self.state = state
         self.material = material
@@ -82,8 +77,7 @@ class Solid(Term):
         self.plane = plane
         self.viscosity = viscosity
         self.density = density
-        self.temperature = temperature
-        self._thermoelastic = None if thermoelastic is None else with_constants(state.mesh, thermoelastic)
+        self._couple(thermoelastic, temperature)
         self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
         self.measures = self._choose_measures(volumetric)
@@ -91,10 +85,28 @@ class Solid(Term):
         self._viscous_form = form(self._viscous_work()) if viscosity else None
         self._viscous = self._viscous_old = 0.0
         self._thermal = self._thermal_old = 0.0
-        if temperature is not None:
-            self._temperature_seen = fem.Function(temperature.space)
-            self._temperature_seen.x.array[:] = temperature.value.x.array
-            self._heating_form = form(self._heating(temperature.value))
+        if thermoelastic is not None and temperature is not None:
+            self._start_heating(thermoelastic.reference, temperature)
+
+    def _couple(self, law: ThermoElastic | None, temperature: Temperature | None) -> None:
+        together = (law is None) == (temperature is None)
+        require("temperature", temperature, together, "given with thermoelastic, and only then")
+        same = temperature is None or temperature.state is self.state
+        require("temperature", temperature, same, "a temperature made with the state of the body")
+        constant = law is None or law.softening == 0
+        # there λ₃ would have to be solved for with another ratio of the moduli at each temperature
+        require("plane", self.plane, self.plane == "strain" or constant, "'strain' if thermoelastic.softening is not 0")
+        self.temperature = temperature
+        self._thermoelastic = None if law is None else with_constants(self.state.mesh, law)
+
+    def _start_heating(self, reference: float, temperature: Temperature) -> None:
+        """Count what heat has brought before the start, from the reference temperature on."""
+        self._temperature_seen = fem.Function(temperature.space)
+        self._temperature_seen.x.array[:] = reference
+        self._heating_form = form(self._heating(temperature.value))
+        self._thermal = self._thermal_old = -integrate(self._heating_form)
+        self._temperature_trial = temperature.value.x.array.copy()
+        self._temperature_seen.x.array[:] = self._temperature_trial
 
     def deformation_gradient(self, u: Expr) -> Expr:
         """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""

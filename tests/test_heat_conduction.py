@@ -37,6 +37,10 @@ class Bar:
         return mesh.locate_entities_boundary(self.state.mesh, 1, lambda x: np.isclose(x[axis], at))
 
     @property
+    def left_half(self):
+        return mesh.locate_entities(self.state.mesh, 2, lambda x: x[0] < 0.5 * self.size[0] + 1e-9)
+
+    @property
     def ends(self):
         return self.face(0, 0.0), self.face(0, self.size[0])
 
@@ -219,7 +223,8 @@ BAD = {
     "initial = -300": lambda b: Temperature(b.state, b.T.space, -300.0, absolute_zero=-273.15),
     "initial = nan": lambda b: Temperature(b.state, b.T.space, np.nan),
     "a scalar space": lambda b: Temperature(b.state, b.state.V, 300.0),
-    "at least one HeatBody": lambda b: HeatTransfer(b.T, [HeatFlux(b.T, b.ends[0], 1.0)]),
+    "a HeatBody for every cell": lambda b: HeatTransfer(b.T, [HeatFlux(b.T, b.ends[0], 1.0)]),
+    "4 nodes have none": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY, body=b.left_half)]),
     "different for all terms": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY), HeatBody(b.T, **BODY)]),
 }
 

@@ -244,6 +244,12 @@ def test_fraction_of_fracture():
 # -- tools ------------------------------------------------------------------------------------------------------------
 
 
+def uncracked():
+    b = make_blocks()
+    T = Temperature(b.state, fem.functionspace(b.state.mesh, ("Lagrange", 1)), 300.0)
+    return InterfaceHeat(T, b.crack(None), LAW)
+
+
 def under_tool(law, temperature=None, held=300.0, mu=None, speed=0.0):
     """A block held rigidly under a plane that presses it and slides along it."""
     b = make_blocks()
@@ -291,6 +297,27 @@ def test_tool_at_the_temperature_of_the_body_shares_by_conductance():
     assert rows["heat_outflow"][-1] == pytest.approx(0.25 * rows["heat_friction"][-1], rel=1e-6)
 
 
+@pytest.mark.mpi
+def test_tool_on_one_face_of_a_crack():
+    """A plane between open faces warms the one it touches."""
+    b = make_blocks()
+    T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
+    crack = b.crack(None)
+    path = Path(lambda t: np.array([0.5, 0.5 - DEPTH]))
+    tool = ToolContact(b.state, Plane((0.0, -1.0)), path, [crack.surface("+")], contact=PenaltyContact(STIFFNESS))
+    mechanics = Mechanics(b.state, [b.solid(), crack, tool], b.drive(b.lower, [0, 0]) + b.drive(b.upper, [0, 1.0]))
+    bodies = [
+        HeatBody(T, density=1.0, capacity=2.0, conductivity=0.5, body=cells, name=name)
+        for cells, name in ((b.lower, "lower"), (b.upper, "upper"))
+    ]
+    terms = [*bodies, InterfaceHeat(T, crack, LAW), ToolHeat(T, tool, LAW, 400.0)]
+    bottom = PrescribedTemperature(T, b.face(1, 0.0), 300.0)
+    # long enough to be steady below, and the upper block is insulated
+    rows = history(ThermoMechanics(mechanics, HeatTransfer(T, terms, [bottom])), 300.0, StepControl.fixed(10.0))
+    assert rows["tool_heat_flow"][-1] == pytest.approx(-100.0 / (1 / (PRESSURE * 0.75) + 0.5 / 0.5), rel=1e-6)
+    assert rows["upper_temperature_max"][-1] == pytest.approx(300.0, abs=1e-9)
+
+
 # -- refusals ---------------------------------------------------------------------------------------------------------
 
 BAD = {
@@ -303,6 +330,7 @@ BAD = {
     "tool_temperature = None": lambda: under_tool(LAW),
     "tool_temperature = 300": lambda: under_tool(AdiabaticTool(0.5), 300.0),
     "tool_temperature = -1": lambda: under_tool(LAW, -1.0),
+    "on a space cracked along the crack": uncracked,
     "law.capacity = 1": lambda: under_tool(ContactHeat(1, 1, capacity=1.0), 300.0),
 }
 

@@ -127,6 +127,16 @@ def test_tangent(gdim, plane):
 # -- energy -----------------------------------------------------------------------------------------------------------
 
 
+def test_audit_of_a_clamped_body():
+    """Its strain energy 9/2 K (α ΔT)² is brought by heat alone, also what it has at the start."""
+    clamped = [(i, 1.0, i, 0.0, None) for i in range(3)]
+    rows = HotCube(LinearElastic(E, NU), ThermoElastic(1e-6, 250.0), supports=clamped).run(4)
+    stored = 4.5 * E / 3 / (1 - 2 * NU) * (1e-6 * (50 + RISE * rows["time"])) ** 2
+    np.testing.assert_allclose(rows["energy_strain"], stored, rtol=1e-3)
+    np.testing.assert_allclose(rows["energy_thermoelastic"], -rows["energy_strain"], rtol=1e-9)
+    assert np.abs(rows["energy_closure"]).max() < 1e-9
+
+
 @pytest.mark.parametrize("iterate", [None, 1e-9])
 def test_audit_of_a_warmed_linear_body_closes(iterate):
     """Warmed and stretched at once, the trapezoidal rule is exact for a linear body."""
