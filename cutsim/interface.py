@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from cutsim.checks import require
 from cutsim.cohesive import CohesiveLaw, process_zone_element
 from cutsim.contact import PenaltyContact
-from cutsim.kinematics import Expr, displacement_jump, midsurface_normal, safe_norm, surface_frame
+from cutsim.interface_history import InterfaceHistory
+from cutsim.interface_law import Response, respond
+from cutsim.kinematics import Expr, displacement_jump, midsurface_normal, surface_frame
 from cutsim.parameters import with_constants
 from cutsim.points import FacetPoints, Surface, Values
 from cutsim.sizes import facet_size, normal_size
@@ -29,36 +31,23 @@ from cutsim.terms import Term
 
 logger = logging.getLogger(__name__)
 
-# Gauss points on the straight path of the displacement over a step, on which interface work is integrated
-_PATH, _PATH_WEIGHTS = (0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(5), (1.0, 0.0), strict=True))
-# relative distance below its history at which a point still counts as loading
-_AT_HISTORY = 1e-9
-
 
 @dataclass(frozen=True)
-class Response:
-    """The law at a displacement: symbolic, at an integration point.
+class CrackResponse(Response):
+    """The law of a crack at a displacement, with its kinematics.
 
     Attributes:
         jump: Displacement jump δ = u⁻ − u⁺ [length].
         opening: δ·n [length].
         slide: Tangential part of the jump, a vector [length].
-        sliding: Its magnitude [length].
-        demand: Loading measure of the cohesive law [its own unit].
         cohesive: Cohesive traction on the '+' face, a vector [stress].
-        pressure: Contact pressure ≥ 0 [stress].
-        damage: Damage in opening and sliding [–]; 1 without a law.
         normal: Unit normal of the mid-surface, from '+' to '−'.
     """
 
     jump: Expr
     opening: Expr
     slide: Expr
-    sliding: Expr
-    demand: Expr
     cohesive: Expr
-    pressure: Expr
-    damage: tuple[Expr, Expr]
     normal: Expr
 
 
@@ -80,6 +69,7 @@ class Crack(Term):
 
     Attributes:
         points: Its integration points, with the facets in the order of all per-facet arrays.
+        history: What they remember.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
         size: Mean size of the facets along the crack, their shortest edge [length].
         normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
@@ -124,15 +114,8 @@ class Crack(Term):
         self._range = fem.Constant(state.mesh, default_scalar_type(closing_range or max(floor, self.size)))
         self._warn_coarse(young)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
-        self._kappa, self._multiplier = self.points.function(), self.points.function()
-        self._multiplier_old = self._multiplier.x.array.copy()
-        columns = self._columns()
-        self._point_values = self.points.evaluator(columns)
-        zero = np.zeros_like(self.points.weights)
-        self._trial: dict[str, Values] = dict.fromkeys(columns, zero)
-        self._trial_old = self._trial
-        self._work: dict[str, Values] = {"cohesive": zero, "contact": zero}
-        self._work_old = self._work
+        self.history = InterfaceHistory(self.points)
+        self._point_values = self.points.evaluator(self._columns())
 
     # -- virtual work ---------------------------------------------------------------------------------------------
 
@@ -158,37 +141,19 @@ class Crack(Term):
         traction = response.cohesive - response.pressure * response.normal
         return ufl.inner(traction, displacement_jump(v)) * self.points.measure
 
-    def response(self, u: Expr) -> Response:
+    def response(self, u: Expr) -> CrackResponse:
         """The law at a displacement, restricted to the crack."""
-        law, contact = self._symbolic_law, self._symbolic_contact
         N = ufl.FacetNormal(self.state.mesh)
         n = midsurface_normal(u, N) if self._current else N("+")
         jump = displacement_jump(u)
         gap = ufl.dot(jump, n)
         slide = jump - gap * n
-        opening = ufl.conditional(ufl.ge(gap, 0), gap, 0.0)
-        multiplier = self.points.at(self._multiplier) / contact.stiffness if self._allowed_penetration else 0.0
+        multiplier = self.points.at(self.history.multiplier) if self._allowed_penetration else 0.0
         far = ufl.dot(jump, jump) / self._range**2 - 1
         fade = ufl.conditional(ufl.gt(far, 0), ufl.exp(-(far**2)), 1.0)
-        pressure = fade * contact.pressure(multiplier - gap)
-        if law is None:
-            none, whole = ufl.as_ufl(0.0), (ufl.as_ufl(1.0), ufl.as_ufl(1.0))
-            return Response(jump, gap, slide, safe_norm(slide, 1e-12), none, 0 * jump, pressure, whole, n)
-        sliding = safe_norm(slide, 1e-12 * law.opening)
-        demand = law.demand(opening, sliding)
-        kappa = self._history(demand)
-        k_n, k_t = law.stiffness(opening, sliding, kappa)
-        cohesive = k_n * opening * n + k_t * slide
-        return Response(jump, gap, slide, sliding, demand, cohesive, pressure, law.damage(kappa), n)
-
-    def _history(self, demand: Expr) -> Expr:
-        """Largest demand so far, the present one included.
-
-        A step starts with every point exactly at its history.  There it counts as loading, so that Newton's first
-        tangent is that of the growing crack, and not a mixture of loading and unloading points drawn by rounding.
-        """
-        kappa = self.points.at(self._kappa)
-        return ufl.conditional(ufl.gt(demand, (1 - _AT_HISTORY) * kappa), demand, kappa)
+        kappa = self.points.at(self.history.kappa)
+        r = respond(self._symbolic_law, self._symbolic_contact, gap, slide, kappa, multiplier, fade)
+        return CrackResponse(**vars(r), jump=jump, opening=gap, slide=slide, cohesive=r.tension * n + r.shear, normal=n)
 
     # -- history --------------------------------------------------------------------------------------------------
 
@@ -214,51 +179,30 @@ class Crack(Term):
 
     def evaluate(self) -> None:
         """Trial history, and the work of the step integrated along the path of the displacement. Collective."""
-        self._work = {name: work.copy() for name, work in self._work_old.items()}
-        for s, weight in zip(_PATH, _PATH_WEIGHTS, strict=True):
-            values = self._evaluate_at(s)
-            for name in self._work:
-                self._work[name] += weight * values[f"{name}_power"]
-        self._trial = self._evaluate_at(1.0)
+        self.history.evaluate(self._evaluate_at)
 
     def augment(self) -> bool:
-        """Uzawa step λ ← p (thesis 4.33) if a closed point is off by more than is allowed. Collective.
-
-        p − λ is the penalty times the penetration; where the crack has opened again, it is what λ still pushes.
-        """
+        """Uzawa step λ ← p (thesis 4.33) if a closed point is off by more than is allowed. Collective."""
         if self._allowed_penetration is None:
             return False
         pressure = self._evaluate_at(1.0)["pressure"]
-        change = np.abs(pressure - self.points.get(self._multiplier))
-        if self.points.maximum(change) <= self.contact.stiffness * self._allowed_penetration:
-            return False
-        self.points.set(self._multiplier, pressure)
-        return True
+        return self.history.augment(pressure, self.contact.stiffness * self._allowed_penetration)
 
     def rollback(self) -> None:
         """Restore the contact multiplier, and what is known at the points, of the committed state."""
-        self._multiplier.x.array[:] = self._multiplier_old
-        self._trial, self._work = self._trial_old, self._work_old
+        self.history.rollback()
 
     def commit(self) -> None:
         """Adopt history, work and multiplier of the step."""
-        self.points.set(self._kappa, np.maximum(self.points.get(self._kappa), self._trial["demand"]))
-        self._multiplier_old[:] = self._multiplier.x.array
-        self._work_old = self._work
-        self._trial_old = self._trial
+        self.history.commit()
 
     def energies(self) -> dict[str, float]:
         """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""
-        stored = self.points.integral(self._trial["stored"])
-        return {
-            "cohesive_stored": stored,
-            "fracture": self.points.integral(self._work["cohesive"]) - stored,
-            "contact": self.points.integral(self._work["contact"]),
-        }
+        return self.history.energies()
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
-        return self.points.maximum(self._trial["damage"] - self._trial_old["damage"]) if self.law is not None else 0.0
+        return self.history.damage_increment() if self.law is not None else 0.0
 
     def diagnose(self) -> str | None:
         """Say where the trial state of the last solve opens or closes most. Collective."""
@@ -268,14 +212,14 @@ class Crack(Term):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
-        penetration = max(self.points.maximum(-self._trial["opening"]), 0.0) / self.normal_size
+        penetration = max(self.points.maximum(-self.history.trial["opening"]), 0.0) / self.normal_size
         columns = {
-            f"{self.name}_opening": (self.points.maximum(self._trial["opening"]), "length"),
+            f"{self.name}_opening": (self.points.maximum(self.history.trial["opening"]), "length"),
             f"{self.name}_penetration": (penetration, "one"),
         }
         if self.law is not None:
             kind = "length" if self.state.mesh.geometry.dim == 2 else "area"
-            columns[f"{self.name}_broken"] = (self.points.integral(self._trial["damage"]), kind)
+            columns[f"{self.name}_broken"] = (self.points.integral(self.history.trial["damage"]), kind)
         return columns
 
     def point_values(self, name: str) -> Values:
@@ -288,14 +232,14 @@ class Crack(Term):
             ValueError: The name is unknown.
         """
         if name == "dissipated":
-            return self._work["cohesive"] - self._trial["stored"]
-        require("name", name, name in self._trial, f"one of {(*self._trial, 'dissipated')}")
-        return self._trial[name]
+            return self.history.dissipated()
+        trial = self.history.trial
+        require("name", name, name in trial, f"one of {(*trial, 'dissipated')}")
+        return trial[name]
 
     def dissipation(self) -> Values:
         """Fracture dissipation of the trial step at the integration points [energy per reference area]."""
-        before = self._work_old["cohesive"] - self._trial_old["stored"]
-        return self.point_values("dissipated") - before
+        return self.history.dissipation()
 
     def facet_mean(self, name: str) -> Values:
         """Mean over each local crack facet of a point quantity; arguments as `point_values`."""

@@ -148,7 +148,7 @@ class Forces:
 def damaged_body(gdim, material):
     b = make_blocks(gdim)
     crack = b.crack(EXPONENTIAL, contact=PENALTY)
-    crack._kappa.x.array[:] = 1.5 * EXPONENTIAL.eps_n
+    crack.history.kappa.x.array[:] = 1.5 * EXPONENTIAL.eps_n
     return b, Forces(b.state, [crack, b.solid(material)])
 
 

@@ -191,7 +191,7 @@ def test_where_friction_acts(acts_on, caplog):
     for opening in (-DEPTH, 0.5 * EXPONENTIAL.eps_n):
         b = make_blocks()
         crack = b.crack(EXPONENTIAL, contact=PenaltyContact(NORMAL), closing_range=10.0)
-        crack.points.set(crack._kappa, np.full_like(crack.points.weights, kappa))
+        crack.points.set(crack.history.kappa, np.full_like(crack.points.weights, kappa))
         friction = CrackFriction(crack, Coulomb(MU, 1e6), acts_on=acts_on)
         mechanics = Mechanics(b.state, [crack, friction], b.drive(b.lower, [0.0, 0.0]))
         b.move(lambda x: 0 * x, lambda x, o=opening: np.array([0 * x[0] + slide, 0 * x[0] + o]))

@@ -59,7 +59,7 @@ def opening_blocks(comm=MPI.COMM_WORLD, law=WEAK):
 def snapshot(mechanics):
     """Every number that a step may change, as bytes."""
     state, (_, crack, plate, load) = mechanics.state, mechanics.terms
-    arrays = [state.u.x.array, state.u_old.x.array, crack._kappa.x.array, crack._multiplier.x.array]
+    arrays = [state.u.x.array, state.u_old.x.array, crack.history.kappa.x.array, crack.history.multiplier.x.array]
     arrays += [plate.position.value, plate._position_old, load._scale.value]
     arrays += [s._value.value for s in mechanics.supports]
     arrays += [crack.point_values(name) for name in ("damage", "opening", "pressure", "dissipated")]
@@ -75,7 +75,9 @@ def test_rollback_is_bit_for_bit():
     run(mechanics, 0.5, StepControl.fixed(0.1))
     before = snapshot(mechanics)
     crack = mechanics.terms[1]
-    assert mechanics.state.mesh.comm.allreduce(crack._multiplier.x.array.any(), MPI.LOR), "the test needs multipliers"
+    assert mechanics.state.mesh.comm.allreduce(crack.history.multiplier.x.array.any(), MPI.LOR), (
+        "the test needs multipliers"
+    )
     mechanics.begin(0.8)
     assert mechanics.solve().converged
     mechanics.evaluate()

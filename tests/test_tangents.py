@@ -163,7 +163,7 @@ def test_crack(law, normal, jump):
     law, scale = LAWS[law]
     b = make_blocks()
     crack = b.crack(law, normal=normal, contact=PenaltyContact(30.0))
-    crack._kappa.x.array[:] = 0.9 if law is BILINEAR and kappa else kappa * scale
+    crack.history.kappa.x.array[:] = 0.9 if law is BILINEAR and kappa else kappa * scale
     u = separated(b, sliding * scale, opening * scale, 0.01 * scale)
     if law is BILINEAR and ((opening < 0 and normal == "reference") or (opening > 0 and kappa)):
         # on the secant T = (1 − d) K δ, whatever the normal; softening in sliding alone is a straight line
@@ -185,7 +185,7 @@ def test_crack_in_three_dimensions(law):
 def test_blended_and_augmented_contact(opening):
     b = make_blocks()
     crack = b.crack(None, contact=PenaltyContact(30.0, blend=0.01), penetration=0.1)
-    crack._multiplier.x.array[:] = 0.15
+    crack.history.multiplier.x.array[:] = 0.15
     assert_slope_two(crack, b.state, separated(b, 0.01, opening, 1e-4), 0.05)
 
 
@@ -207,7 +207,7 @@ def test_friction_on_a_crack(case, gdim, normal):
     b = make_blocks(gdim)
     b.state.begin(0.7)
     crack = b.crack(law, normal=normal, contact=PenaltyContact(30.0))
-    crack._kappa.x.array[:] = kappa * 0.1
+    crack.history.kappa.x.array[:] = kappa * 0.1
     term = CrackFriction(crack, friction)
     u = separated(b, sliding * 0.1, opening * 0.1, 1e-3)
     if normal == "reference" and (case == "stick" or (gdim == 2 and jump != "breaking under compression")):
