@@ -21,6 +21,7 @@ from cutsim.space import cracked_space
 from cutsim.staggered import ThermoMechanics
 from cutsim.state import State
 from cutsim.stepping import StepControl, StepError, StepReport, run
+from cutsim.surface_pair import SurfacePair
 from cutsim.temperature import Temperature
 from cutsim.thermoelastic import ThermoElastic
 from cutsim.tool_contact import ToolContact
@@ -67,6 +68,7 @@ __all__ = [
     "StepReport",
     "Support",
     "Surface",
+    "SurfacePair",
     "TaggedMesh",
     "Temperature",
     "ThermoElastic",

@@ -4,6 +4,8 @@ import numpy as np
 from dolfinx import fem, la
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import coo_array
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,24 @@ def global_dot(comm: MPI.Comm, a: NDArray[np.float64], b: NDArray[np.float64]) -
 def resultant(comm: MPI.Comm, forces: NDArray[np.float64], gdim: int) -> Array:
     """Sum of nodal forces (owned entries, blocked by component): a force vector."""
     return np.asarray(comm.allreduce(forces.reshape(-1, gdim).sum(axis=0), op=MPI.SUM))
+
+
+def add_blocks(A: PETSc.Mat, dofs: NDArray[np.int64], blocks: Array) -> None:
+    """Add dense blocks to a matrix, on rows of any rank. The caller assembles it.
+
+    Args:
+        A: The matrix.
+        dofs: Global dofs of each block, shape (blocks, n).
+        blocks: Shape (blocks, n, n).
+    """
+    n = dofs.shape[1]
+    numbers, local = np.unique(dofs, return_inverse=True)
+    local = local.reshape(dofs.shape)
+    places = np.repeat(local, n, axis=1).ravel(), np.tile(local, n).ravel()
+    sums = coo_array((blocks.ravel(), places), shape=(len(numbers),) * 2).tocsr()
+    columns = numbers[sums.indices]
+    integers = (a.astype(PETSc.IntType) for a in (sums.indptr, columns))
+    A.setValuesIJV(*integers, sums.data, addv=PETSc.InsertMode.ADD, rowmap=numbers.astype(PETSc.IntType))
 
 
 def moment(comm: MPI.Comm, forces: NDArray[np.float64], arms: NDArray[np.float64], gdim: int) -> Array:

@@ -21,6 +21,7 @@ from cutsim.schemes import TRAPEZOIDAL, Scheme
 from cutsim.solid import Solid
 from cutsim.solver import NonlinearProblem, Outcome
 from cutsim.state import State
+from cutsim.surface_pair import SurfacePair
 from cutsim.terms import Term
 
 #: Uzawa augmentations allowed in one step.
@@ -76,7 +77,7 @@ class Mechanics:
         self.terms: tuple[Term, ...] = self._static if self.inertia is None else (*terms, self.inertia)
         self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
         v = ufl.TestFunction(state.V)
-        cracks = [t for t in terms if isinstance(t, Crack)]
+        interfaces = [t for t in terms if isinstance(t, Crack | SurfacePair)]
         self.problem = NonlinearProblem(
             sum((t.residual(v) for t in self.terms), start=ufl.Form([])),
             state.u,
@@ -84,12 +85,13 @@ class Mechanics:
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
             symmetric=all(t.symmetric for t in terms),
             inertia=self.inertia is not None,
-            interface_dofs=self._interface_nodes(cracks) if cracks else None,
+            terms=[t for t in terms if t.assembles],
+            interface_dofs=self._interface_nodes(interfaces) if interfaces else None,
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
             rtol=rtol,
         )
-        self.audit = self._trial_audit = EnergyAudit(scale=max((c.facet_energy for c in cracks), default=0.0))
+        self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
         self._residual_old: NDArray[np.float64] = self._residual
 
@@ -212,14 +214,14 @@ class Mechanics:
         self.state.commit()
         self.audit, self._residual_old = self._trial_audit, self._residual
 
-    def _interface_nodes(self, cracks: Sequence[Crack]) -> NDArray[np.int32]:
-        """Owned nodes on both faces of all cracks."""
+    def _interface_nodes(self, interfaces: Sequence[Crack | SurfacePair]) -> NDArray[np.int32]:
+        """Owned nodes on both faces of all cracks and pairs of surfaces."""
         dofmap, tdim = self.state.V.dofmap, self.state.mesh.topology.dim
         facets = cpp.mesh.cell_num_entities(self.state.mesh.topology.cell_type, tdim - 1)
         closure = [dofmap.dof_layout.entity_closure_dofs(tdim - 1, f) for f in range(facets)]
         marks = la.vector(dofmap.index_map, 1)
-        for crack in cracks:
-            for cell, facet in crack.entities.reshape(-1, 2):
+        for interface in interfaces:
+            for cell, facet in interface.entities.reshape(-1, 2):
                 marks.array[dofmap.cell_dofs(cell)[closure[facet]]] = 1.0
         marks.scatter_reverse(la.InsertMode.add)
         return np.flatnonzero(marks.array[: dofmap.index_map.size_local]).astype(np.int32)

@@ -18,6 +18,7 @@ from cutsim.checks import require
 from cutsim.options import Options
 from cutsim.preconditioners import LaggedPC, Preset, create_lagged, fallback_for, preset_for
 from cutsim.tangent import Tangent
+from cutsim.terms import Term
 
 log = logging.getLogger(__name__)
 
@@ -31,6 +32,8 @@ BC_ROUNDING = 1e-12
 GROWTH = 1e6
 
 _Reason = PETSc.SNES.ConvergedReason
+# SNES stops for a new matrix, and goes on
+_PAUSE = _Reason.CONVERGED_ITS
 _NOT_FINITE = "residual or tangent not finite (element inverted, J <= 0)"
 _SENTENCES = {
     _Reason.DIVERGED_FUNCTION_DOMAIN: _NOT_FINITE,
@@ -87,6 +90,7 @@ class NonlinearProblem:
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
         symmetric: Whether the tangent is symmetric.
         inertia: Whether inertia balances forces, too: there may be supports without any reaction.
+        terms: Terms with forces that are not in F: they assemble themselves.
         form_compiler_options: Options of FFCx.
         rtol: Tolerance relative to the force scale; PETSc option `snes_rtol`.
 
@@ -113,6 +117,7 @@ class NonlinearProblem:
         interface_dofs: NDArray[np.int32] | None = None,
         symmetric: bool = False,
         inertia: bool = False,
+        terms: Sequence[Term] = (),
         form_compiler_options: Mapping[str, Any] | None = None,
         rtol: float = 1e-8,
     ) -> None:
@@ -128,8 +133,9 @@ class NonlinearProblem:
             )
             for form in (F, J)
         )
+        self._terms = tuple(terms)
         self._create_vectors()
-        self._tangent = Tangent(self._a, u.function_space, symmetric)
+        self._tangent = Tangent(self._a, u.function_space, symmetric, terms)
         self._create_snes(rtol)
 
     def _create_vectors(self) -> None:
@@ -138,10 +144,10 @@ class NonlinearProblem:
         self._comm: MPI.Comm = V.mesh.comm
         self._n_dofs = layout[0].size_global * layout[1]
         self._n = layout[0].size_local * layout[1]
-        self._r, self._g = la.vector(*layout), la.vector(*layout)
+        self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
         # SNES iterates on a vector of its own: were it that of u, line searches would spoil their own start.
         self._x = la.create_petsc_vector(*layout)
-        self._f = self._x.duplicate()
+        self._f, self._added = self._x.duplicate(), self._x.duplicate()
         self.known: NDArray[np.float64] = np.zeros(self._n)
         self.fixed = np.zeros(self._n, dtype=bool)
         for bc in self.bcs:
@@ -234,12 +240,25 @@ class NonlinearProblem:
         self._scale = self._previous_scale
         iterations = linear = 0
         while True:
+            if self._tangent.outdated:
+                self._renew_tangent()
             self._snes.setTolerances(max_it=self._max_it - iterations)
             self._snes.solve(None, self._x)
             iterations += self._snes.getIterationNumber()
             linear += self._snes.getLinearSolveIterations()
+            if self._snes.getConvergedReason() == _PAUSE:
+                continue
             if self._snes.getConvergedReason() != _Reason.DIVERGED_LINEAR_SOLVE or not self._better_preconditioner():
                 return iterations, linear
+
+    def _renew_tangent(self) -> None:
+        """A matrix for another sparsity pattern; what was factorised before is of no use."""
+        if self._lagged is None:
+            self._snes.getKSP().reset()
+        else:
+            self._lagged.refresh(pattern=True)
+        self._tangent.renew()
+        self._snes.setJacobian(self._evaluate_tangent, self._tangent.A)
 
     def _better_preconditioner(self) -> bool:
         """After a failed linear solve: rebuild the preconditioner, or else factorise; False if neither is left."""
@@ -298,6 +317,21 @@ class NonlinearProblem:
             fem.apply_lifting(r, [self._a], [self.bcs], [self.u.x.array], -1.0)
         self._r.scatter_reverse(la.InsertMode.add)
         r[: self._n] += self.known
+        if self._terms:
+            self._add_terms(lift)
+
+    def _add_terms(self, lift: bool) -> None:
+        """Add the forces of terms that assemble themselves, and the lifting of prescribed increments."""
+        jump = self._lifted.array
+        jump[:] = 0.0
+        jump[: self._n][self.fixed] = (self._g.array - self.u.x.array)[: self._n][self.fixed]
+        self._lifted.scatter_forward()
+        lift = lift and self._comm.allreduce(bool(jump.any()), MPI.LOR)
+        self._added.set(0.0)
+        for term in self._terms:
+            term.add_forces(self._added, jump if lift else None)
+        self._added.assemble()
+        self._r.array[: self._n] += self._added.array_r
 
     def _evaluate_residual(self, snes: PETSc.SNES, x: PETSc.Vec, b: PETSc.Vec) -> None:
         """Called by SNES: residual with lifting; u - g in the constrained rows."""
@@ -331,7 +365,8 @@ class NonlinearProblem:
         jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self.fixed], x))
         self._size = max(self._size, size)
         length = self._size + self._h
-        return self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
+        reason = self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
+        return _PAUSE if reason == _Reason.ITERATING and self._tangent.outdated else reason
 
     def _judge(self, iteration: int, free: float, reaction: float, floor: float, bcs_hold: bool) -> int:
         """Decide from global numbers only, so that every rank decides alike."""
@@ -350,7 +385,7 @@ class NonlinearProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects and remove the options of this problem."""
-        for thing in (self._snes, self._tangent, self._x, self._f):
+        for thing in (self._snes, self._tangent, self._x, self._f, self._added):
             thing.destroy()
         self._options.clear()
 

@@ -10,6 +10,7 @@ import numpy as np
 import ufl
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
 from cutsim.kinematics import Expr
 
@@ -26,10 +27,12 @@ class Term:
     Attributes:
         name: Name in messages and in the columns of the history.
         symmetric: Whether the tangent of the term is symmetric.
+        assembles: Whether the term has forces that are no form: it then adds them, and their tangent, by itself.
     """
 
     name: str = "term"
     symmetric: bool = True
+    assembles: bool = False
 
     def residual(self, v: Expr) -> ufl.Form:
         """Internal minus external virtual work."""
@@ -39,6 +42,25 @@ class Term:
     def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
         """Maps from mesh entities to the cells of submeshes on which coefficients of the term live."""
         return {}
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
+        """Add forces that are no form, at the present displacement. Collective.
+
+        Args:
+            b: Vector of the owned dofs; the caller assembles it afterwards.
+            along: Displacement of the local dofs, ghosts included, times which the tangent is added, too.
+        """
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add the tangent of these forces; the caller assembles the matrix afterwards. Collective."""
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros wherever `add_tangent` may add something, as long as the `pattern` is the same. Collective."""
+
+    @property
+    def pattern(self) -> int:
+        """Number of the sparsity pattern, the same on all ranks; another one asks for another matrix."""
+        return 0
 
     @property
     def corners(self) -> tuple[float, ...]:

@@ -12,8 +12,10 @@ SOURCES = Path(cutsim.__file__).parent
 LAYERS = [
     {"checks", "kinematics", "measures", "compat", "assembly", "options", "parameters", "sizes", "units"},
     {"materials", "cohesive", "contact", "friction", "tools", "schemes", "thermoelastic", "meshing", "space"},
-    {"state", "terms", "points", "slip", "temperature", "preconditioners", "tangent"},
+    {"state", "terms", "points", "slip", "temperature", "preconditioners", "tangent", "pairing"},
     {"heat_balance", "contact_heat", "heat_exchange"},
+    {"interface_law", "interface_history", "outer_surface", "pair_kinematics"},
+    {"pair_forces", "surface_pass", "surface_pair"},
     {"interface", "solid", "loads", "solver"},
     {"tool_contact", "inertia", "crack_friction", "energy", "conduction", "heat_loads", "interface_heat"},
     {"mechanics", "tool_heat", "heat_transfer"},

@@ -1,0 +1,168 @@
+"""Two surfaces that find each other: search, and projection along rays (docs/theory.md §3.5). No mesh, no state.
+
+A ray from a point x of the slave surface along its unit normal ν meets the master surface at x + g ν.  Positions are
+in the current configuration; an array of facets has the shape (facets, nodes, dimension).
+"""
+
+from dataclasses import dataclass
+
+import basix
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: How far outside a facet, in reference coordinates, a ray still meets it: no ray slips through between two facets.
+EDGE = 1e-9
+# Newton iterations for the place on a facet, its accuracy, and how far outside of the facet it is looked for
+_ITERATIONS, _ACCURACY, _OUTSIDE = 20, 1e-14, 1.0
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Reference shape of all facets of a surface.
+
+    Args:
+        element: Lagrange element on the reference facet.
+    """
+
+    element: basix.finite_element.FiniteElement
+
+    @property
+    def centre(self) -> Array:
+        """Reference coordinates of the centre."""
+        return np.asarray(basix.geometry(self.element.cell_type).mean(axis=0))
+
+    def values(self, xi: Array) -> tuple[Array, Array]:
+        """Shape functions, shape (n, nodes), and their derivatives, shape (n, directions, nodes), at n points."""
+        tables = self.element.tabulate(1, xi)[..., 0]
+        return tables[0], np.moveaxis(tables[1:], 0, 1)
+
+    def contains(self, xi: Array) -> NDArray[np.bool_]:
+        """Which of n reference points are on the facet, its edges included."""
+        inside = (xi >= -EDGE).all(axis=-1)
+        if self.element.cell_type == basix.CellType.triangle:
+            return np.asarray(inside & (xi.sum(axis=-1) <= 1 + EDGE))
+        return np.asarray(inside & (xi <= 1 + EDGE).all(axis=-1))
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Where the rays of some points meet the master surface.
+
+    Attributes:
+        points: The points that have a partner, ascending.
+        facets: Master facet of each.
+        xi: Reference coordinates on it, shape (hits, directions).
+        gap: Signed distance g along the ray, negative for penetration [length].
+    """
+
+    points: Indices
+    facets: Indices
+    xi: Array
+    gap: Array
+
+
+def near_facets(rays: Array, master: Array, margin: float) -> tuple[Indices, Indices]:
+    """Pairs of facets of two surfaces that are near each other.
+
+    Args:
+        rays: Points that the rays of each slave facet reach, shape (slave facets, points, dimension).
+        master: Nodes of the master facets.
+        margin: Distance that both may still move before the answer is out of date [length].
+
+    Returns:
+        Slave and master facets of the pairs, in the order of the slave facets.
+    """
+    boxes = [(corners.min(axis=1), corners.max(axis=1)) for corners in (rays, master)]
+    centres = [0.5 * (low + high) for low, high in boxes]
+    reach = sum(0.5 * np.linalg.norm(high - low, axis=1).max(initial=0.0) for low, high in boxes) + 2 * margin
+    if not (len(rays) and len(master)):
+        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    trees = [cKDTree(c) for c in centres]
+    found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
+    s, m = found["i"].astype(np.int64), found["j"].astype(np.int64)
+    (low_s, high_s), (low_m, high_m) = boxes
+    overlap = ((low_s[s] <= high_m[m] + margin) & (low_m[m] <= high_s[s] + margin)).all(axis=1)
+    order = np.lexsort((m[overlap], s[overlap]))
+    return s[overlap][order], m[overlap][order]
+
+
+def project(
+    x: Array, frames: Array, pairs: tuple[Indices, Indices], master: Array, sides: Array, shape: Shape, search: float
+) -> Hits:
+    """Where rays along the normals of points first meet the master surface.
+
+    Only the outside of a facet is met, so that a ray through a thin body does not find its back.
+
+    Args:
+        x: Points, shape (points, dimension).
+        frames: Their frames (ν, a₁, …) as rows, right-handed, shape (points, dimension, dimension).
+        pairs: Points and master facets that are tried.
+        master: Nodes of the master facets.
+        sides: For each master facet ±1: whether its outward normal is that of its reference coordinates.
+        shape: Reference shape of the master facets.
+        search: Largest distance of a partner, on either side [length].
+
+    Returns:
+        The nearest hit of each point that has one.
+    """
+    points, facets = pairs
+    y, near = _in_frames(x, frames, points, facets, master, search)
+    points, facets = points[near], facets[near]
+    xi = _solve(y[..., 1:], shape)
+    values, derivatives = shape.values(xi)
+    gap = np.einsum("nb,nb->n", values, y[..., 0])
+    off = np.abs(np.einsum("nb,nbi->ni", values, y[..., 1:])).max(axis=-1, initial=0.0)
+    size = np.abs(y - y[:, :1]).max(axis=(1, 2), initial=0.0)
+    outside = sides[facets] * _determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:])) < 0
+    hit = shape.contains(xi) & (np.abs(gap) <= search) & (off <= EDGE * size) & outside
+    points, facets, xi, gap = points[hit], facets[hit], xi[hit], gap[hit]
+    order = np.lexsort((facets, np.abs(gap), points))
+    first = order[np.unique(points[order], return_index=True)[1]]
+    return Hits(points[first], facets[first], xi[first], gap[first])
+
+
+def _in_frames(
+    x: Array, frames: Array, points: Indices, facets: Indices, master: Array, search: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Nodes of the facets as seen from the points, and the pairs whose ray passes near the facet at all."""
+    centres = master.mean(axis=1)
+    radii = np.linalg.norm(master - centres[:, None], axis=2).max(axis=1, initial=0.0)
+    place = np.einsum("nij,nj->ni", frames[points], centres[facets] - x[points])
+    radius = (1 + 1e-6) * radii[facets]
+    near = (np.abs(place[:, 0]) <= search + radius) & (np.linalg.norm(place[:, 1:], axis=1) <= radius)
+    points, facets = points[near], facets[near]
+    return np.einsum("nij,nbj->nbi", frames[points], master[facets] - x[points, None]), near
+
+
+def _solve(y: Array, shape: Shape) -> Array:
+    """Reference coordinates at which facets pass through the origin of the plane, by Newton's method."""
+    centre = shape.centre
+    xi = np.tile(centre, (len(y), 1))
+    for _ in range(_ITERATIONS):
+        values, derivatives = shape.values(xi)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = inverse(np.einsum("nab,nbi->nia", derivatives, y)) @ np.einsum("nb,nbi->ni", values, y)[..., None]
+        new = np.clip(xi - step[..., 0], -_OUTSIDE, 1 + _OUTSIDE)
+        change = np.abs(new - xi).max(initial=0.0)
+        xi = new
+        if change <= _ACCURACY:
+            break
+    return xi
+
+
+def inverse(A: Array) -> Array:
+    """Inverses of 1 × 1 or 2 × 2 matrices, shape (n, d, d)."""
+    if A.shape[-1] == 1:
+        return np.asarray(1 / A)
+    adjugate = np.stack([A[..., 1, 1], -A[..., 0, 1], -A[..., 1, 0], A[..., 0, 0]], axis=-1).reshape(A.shape)
+    return np.asarray(adjugate / _determinant(A)[:, None, None])
+
+
+def _determinant(A: Array) -> Array:
+    if A.shape[-1] == 1:
+        return np.asarray(A[..., 0, 0])
+    return np.asarray(A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0])

@@ -1,0 +1,217 @@
+"""One surface against another: the law at the points of the first, with its memory (docs/theory.md §3.5)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim import pair_forces
+from cutsim.assembly import add_blocks
+from cutsim.cohesive import CohesiveLaw
+from cutsim.contact import PenaltyContact
+from cutsim.friction import FrictionLaw
+from cutsim.interface_history import InterfaceHistory
+from cutsim.interface_law import respond
+from cutsim.pair_forces import Tractions
+from cutsim.pair_kinematics import PairKinematics, Pairs
+from cutsim.pairing import Array
+from cutsim.parameters import with_constants
+from cutsim.points import FacetPoints, Values
+from cutsim.slip import SlipHistory, completed
+from cutsim.state import State
+
+
+@dataclass(frozen=True)
+class PairLaws:
+    """The laws of a pair, which are those of a crack.
+
+    Args:
+        cohesive: Cohesive law, None for a broken interface.
+        contact: Contact law.
+        friction: Friction law, None for none; it acts on the broken fraction.
+    """
+
+    cohesive: CohesiveLaw | None
+    contact: PenaltyContact
+    friction: FrictionLaw | None
+
+
+class SurfacePass:
+    """The points of a slave surface against a master surface. Every method is collective.
+
+    The traction T acts on the slave, −T on the master.  Its components follow from the jump by the laws of a crack: the
+    jump is a function of the points, which is found beforehand.
+
+    Args:
+        state: Displacement and time.
+        points: Integration points on the slave facets.
+        kinematics: Finds the jump.
+        laws: Laws.
+        weight: Factor of the virtual work.
+
+    Attributes:
+        points: Integration points.
+        history: What they remember of opening and damage.
+        slip: What they remember of friction, or None.
+        force: Force on the slave surface in the trial state [force].
+    """
+
+    def __init__(
+        self, state: State, points: FacetPoints, kinematics: PairKinematics, laws: PairLaws, *, weight: float
+    ) -> None:
+        self._state, self.points, self._kinematics, self._weight = state, points, kinematics, weight
+        self._dim = state.mesh.geometry.dim
+        own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
+        self._weights = weight * own.ravel()
+        self._jump = points.function(self._dim)
+        self.history = InterfaceHistory(points)
+        self.slip: SlipHistory | None = None
+        self._seen: Array | None = None
+        self._take()
+        self._write(laws)
+        self.force = self._force_old = np.zeros(self._dim)
+
+    # -- law ------------------------------------------------------------------------------------------------------
+
+    def _write(self, laws: PairLaws) -> None:
+        """The laws as expressions of the jump."""
+        mesh, at = self._state.mesh, self.points.at
+        cohesive = None if laws.cohesive is None else with_constants(mesh, laws.cohesive)
+        contact = with_constants(mesh, laws.contact)
+        jump = ufl.variable(at(self._jump))
+        slide = ufl.as_vector([jump[i] for i in range(1, self._dim)])
+        r = respond(cohesive, contact, jump[0], slide, at(self.history.kappa))
+        shear = [r.shear[i] for i in range(self._dim - 1)]
+        columns = {
+            "demand": r.demand,
+            "cohesive": ufl.as_vector([r.tension, *shear]),
+            "damage": r.damage[0],
+            "sliding": r.sliding,
+            "pressure": r.pressure,
+        }
+        if laws.friction is not None:
+            friction = completed(laws.friction, laws.contact.stiffness)
+            self.slip = SlipHistory(self._state, self.points, friction, slide, r.pressure, share=r.damage[1])
+            shear = [s + r.damage[1] * t for s, t in zip(shear, self.slip.traction, strict=True)]
+        traction = ufl.as_vector([r.tension - r.pressure, *shear])
+        stiffness = ufl.diff(traction, jump)
+        flat = [stiffness[i, j] for i in range(self._dim) for j in range(self._dim)]
+        self._values = self.points.evaluator(columns)
+        self._traction = self.points.evaluator({"traction": traction})
+        self._linear = self.points.evaluator({"traction": traction, "stiffness": ufl.as_vector(flat)})
+
+    def _tractions(self, *, linearised: bool) -> Tractions:
+        """Tractions for the jump that was found last."""
+        values = self._linear() if linearised else self._traction()
+        traction = values["traction"].reshape(-1, self._dim)
+        stiffness = values["stiffness"] if linearised else np.zeros((len(traction), self._dim, self._dim))
+        return Tractions(traction, stiffness.reshape(-1, self._dim, self._dim), self._weights)
+
+    # -- configurations -------------------------------------------------------------------------------------------
+
+    def _take(self) -> Pairs:
+        """Pairs at the present displacement, made known to the law."""
+        u = self._state.u.x.array
+        same = self._seen is not None and np.array_equal(u, self._seen)
+        if not self._state.mesh.comm.allreduce(same, op=MPI.LAND):
+            self._pairs = self._kinematics.pairs(self._kinematics.nodes(u))
+            self._seen = u.copy()
+            self._set_jump(self._pairs)
+        return self._pairs
+
+    def _set_jump(self, pairs: Pairs) -> None:
+        self.points.set(self._jump, pairs.jump.reshape(*self.points.weights.shape, self._dim))
+
+    def _shaped(self, values: Array) -> Values:
+        return values.reshape(self.points.weights.shape)
+
+    def begin(self) -> None:
+        """Start a step from the committed displacement."""
+        self._kinematics.begin(self._kinematics.nodes(self._state.u_old.x.array))
+        self._seen = None
+
+    def evaluate(self) -> None:
+        """Trial history, and the force on the slave, of the converged trial displacement."""
+        ends = [self._kinematics.nodes(u.x.array) for u in (self._state.u_old, self._state.u)]
+        self.history.evaluate(lambda s: self._along(ends, s))
+        if self.slip is not None:
+            self.slip.evaluate()
+        pairs, tractions = self._take(), self._tractions(linearised=False)
+        local = np.einsum("n,na,nai->i", self._weights, tractions.values, pairs.slave.frames)
+        self.force = self._state.mesh.comm.allreduce(local)
+
+    def _along(self, ends: list[tuple[Array, Array]], s: float) -> dict[str, Values]:
+        """Values on the way of the step, see `cutsim.interface_history.Along`."""
+        (slave, master), (slave_end, master_end) = ends
+        pairs = self._kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
+        self._set_jump(pairs)
+        values = self._values()
+        change = pairs.increment(self._kinematics.interpolate(slave_end - slave), master_end - master)
+        power = np.einsum("nai,ni->na", pairs.slave.frames, change)
+        cohesive = values.pop("cohesive").reshape(-1, self._dim)
+        return values | {
+            "cohesive_power": self._shaped(np.einsum("na,na->n", cohesive, power)),
+            "contact_power": -values["pressure"] * self._shaped(power[:, 0]),
+            "stored": 0.5 * self._shaped(np.einsum("na,na->n", cohesive, pairs.jump)),
+            "opening": self._shaped(pairs.jump[:, 0]),
+        }
+
+    def energies(self) -> dict[str, float]:
+        """Energies of the pass, by entry of the audit."""
+        total = {**self.history.energies(), "friction": 0.0}
+        for entry, value in (self.slip.energies() if self.slip is not None else {}).items():
+            total[entry] += value
+        return {entry: self._weight * value for entry, value in total.items()}
+
+    def rollback(self) -> None:
+        """Forget the trial step."""
+        self.history.rollback()
+        if self.slip is not None:
+            self.slip.rollback()
+        self.force, self._seen = self._force_old, None
+
+    def commit(self) -> None:
+        """Adopt history, slide and force of the step."""
+        self._kinematics.commit(self._take())
+        self.history.commit()
+        if self.slip is not None:
+            self.slip.commit()
+        self._force_old = self.force
+
+    # -- forces ---------------------------------------------------------------------------------------------------
+
+    @property
+    def pattern(self) -> int:
+        """Number of the sparsity pattern."""
+        return self._kinematics.version
+
+    def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
+        """Add nodal forces, as `cutsim.terms.Term.add_forces`."""
+        kinematics, pairs = self._kinematics, self._take()
+        tractions = self._tractions(linearised=along is not None)
+        rows = pair_forces.active(pairs, tractions)
+        forces = pair_forces.forces(kinematics, pairs, tractions, rows)
+        if along is not None:
+            change = kinematics.at_stencil(along, pairs, rows)
+            forces += np.einsum("nricj,ncj->nri", pair_forces.tangents(kinematics, pairs, tractions, rows), change)
+        dofs = self._dofs(pair_forces.nodes(kinematics, pairs, rows))
+        b.setValues(dofs.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add the tangent, as `cutsim.terms.Term.add_tangent`."""
+        kinematics, pairs, tractions = self._kinematics, self._take(), self._tractions(linearised=True)
+        rows = pair_forces.active(pairs, tractions)
+        dofs = self._dofs(pair_forces.nodes(kinematics, pairs, rows))
+        blocks = pair_forces.tangents(kinematics, pairs, tractions, rows)
+        add_blocks(A, dofs, blocks.reshape(*dofs.shape, -1))
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros, as `cutsim.terms.Term.add_pattern`."""
+        dofs = self._dofs(self._kinematics.near_nodes())
+        add_blocks(A, dofs, np.zeros((*dofs.shape, dofs.shape[1])))
+
+    def _dofs(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        return (nodes[..., None] * self._dim + np.arange(self._dim)).reshape(len(nodes), -1)

@@ -1,0 +1,210 @@
+"""Two bodies with meshes of their own: they find each other, press, stick and slide (docs/theory.md §3.5)."""
+
+from dataclasses import dataclass
+
+import basix.ufl
+import numpy as np
+import pytest
+from conftest import slopes
+from dolfinx import fem, mesh
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from cutsim.contact import PenaltyContact
+from cutsim.friction import Coulomb
+from cutsim.loads import Support
+from cutsim.materials import LinearElastic
+from cutsim.mechanics import Mechanics
+from cutsim.solid import Solid
+from cutsim.state import State
+from cutsim.surface_pair import SurfacePair
+
+E = 2.0
+KINDS = {
+    2: (mesh.create_rectangle, mesh.CellType.quadrilateral, mesh.CellType.triangle),
+    3: (mesh.create_box, mesh.CellType.hexahedron, mesh.CellType.tetrahedron),
+}
+
+
+@dataclass(frozen=True)
+class Stack:
+    """Boxes that do not share a node."""
+
+    state: State
+    boxes: tuple
+
+    @property
+    def gdim(self):
+        return self.state.mesh.geometry.dim
+
+    def cells(self, box):
+        """Cells of a box, ghosts included."""
+        low, high = self.boxes[box][:2]
+        count = self.state.mesh.topology.index_map(self.gdim)
+        cells = np.arange(count.size_local + count.num_ghosts, dtype=np.int32)
+        x = mesh.compute_midpoints(self.state.mesh, self.gdim, cells)[:, : self.gdim]
+        return cells[np.all((x > low) & (x < high), axis=1)]
+
+    def face(self, box, axis, end):
+        """Exterior facets of a box where a coordinate is at its low (0) or high (1) end."""
+        domain, at = self.state.mesh, self.boxes[box][end][axis]
+        facets = mesh.locate_entities_boundary(domain, self.gdim - 1, lambda x: np.isclose(x[axis], at))
+        domain.topology.create_connectivity(self.gdim - 1, self.gdim)
+        owner = domain.topology.connectivity(self.gdim - 1, self.gdim)
+        own = set(self.cells(box))
+        return np.array([f for f in facets if owner.links(f)[0] in own], dtype=np.int32)
+
+    def pair(self, slave=1, master=0, **options):
+        """The bottom of one box against the top of another."""
+        up = self.gdim - 1
+        return SurfacePair(self.state, self.face(slave, up, 0), self.face(master, up, 1), **{"young": E, **options})
+
+    def move(self, motion, box=None):
+        """Set the displacement: a function of the positions (3, n) → (gdim, n), of one box or of all."""
+        cells = self.cells(box) if box is not None else None
+        self.state.u.interpolate(lambda x: motion(x)[: self.gdim], cells)
+        self.state.u.x.scatter_forward()
+
+    def drive(self, box, end, path, name=None):
+        """Move the face of a box at an end of the last axis."""
+        facets = self.face(box, self.gdim - 1, end)
+        return [
+            Support(self.state, facets, i, value, name=name and f"{name}_{'xyz'[i]}")
+            for i, value in enumerate(path)
+            if value is not None
+        ]
+
+
+def stack(*boxes, simplices=False, degree=1, comm=MPI.COMM_WORLD):
+    """A mesh of boxes (low corner, high corner, numbers of cells)."""
+    gdim = len(boxes[0][0])
+    create, *kinds = KINDS[gdim]
+    kind = kinds[simplices]
+    cells, x, count = [], [], 0
+    for low, high, n in boxes if comm.rank == 0 else ():
+        part = create(MPI.COMM_SELF, [np.array(low, float), np.array(high, float)], n, kind)
+        cells.append(part.geometry.dofmap + count)
+        x.append(part.geometry.x[:, :gdim])
+        count += len(x[-1])
+    corners = 2**gdim if not simplices else gdim + 1
+    cells = np.concatenate(cells) if cells else np.empty((0, corners), dtype=np.int64)
+    x = np.concatenate(x) if x else np.empty((0, gdim))
+    element = basix.ufl.element("Lagrange", kind.name, 1, shape=(gdim,))
+    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+    domain = mesh.create_mesh(comm, cells.astype(np.int64), x, element, partitioner)
+    return Stack(State(fem.functionspace(domain, ("Lagrange", degree, (gdim,)))), boxes)
+
+
+def two(gdim, n=(2, 3), overhang=0.0, **options):
+    """An upper box of unit width on a lower one, n cells each along the interface."""
+    low, high = [-overhang] * (gdim - 1) + [-1.0], [1.0 + overhang] * (gdim - 1) + [0.0]
+    lower = (low, high, [n[0]] * (gdim - 1) + [2])
+    upper = ([0.0] * gdim, [1.0] * gdim, [n[1]] * (gdim - 1) + [2])
+    return stack(lower, upper, **options)
+
+
+# -- tangent ----------------------------------------------------------------------------------------------------------
+
+STEPS = np.array([1e-2, 5e-3, 2.5e-3])
+
+
+class Assembled:
+    """Nodal forces of a term that assembles itself, and their tangent."""
+
+    def __init__(self, term, state):
+        self.term, self.state = term, state
+        V = state.V
+        self.n = V.dofmap.index_map.size_local * V.dofmap.index_map_bs
+
+    def forces(self, u, along=None):
+        self.state.u.x.array[:] = u
+        b = PETSc.Vec().createMPI((self.n, None), comm=self.state.mesh.comm)
+        self.term.add_forces(b, along)
+        b.assemble()
+        return b.array.copy()
+
+    def matrix(self, u):
+        self.state.u.x.array[:] = u
+        A = PETSc.Mat().createDense(((self.n, None), (self.n, None)), comm=self.state.mesh.comm)
+        A.setUp()
+        self.term.add_tangent(A)
+        A.assemble()
+        return A.getDenseArray().copy()
+
+
+def wavy(V, seed, size):
+    """Some smooth field."""
+    rng = np.random.default_rng(seed)
+    gdim = V.mesh.geometry.dim
+    a, b = rng.uniform(-2, 2, (gdim, 3)), rng.uniform(-2, 2, (gdim, 3))
+    w = fem.Function(V)
+    w.interpolate(lambda x: np.array([np.sin(a[i] @ x + i) + 0.5 * np.cos(b[i] @ x) for i in range(gdim)]))
+    return size * w.x.array
+
+
+CASES = {
+    "frictionless": (None, 0.0),
+    "stick": (Coulomb(50.0, 7.0), 0.02),
+    "slip": (Coulomb(0.4, 1e3), 0.05),
+}
+
+
+@pytest.mark.parametrize("fixed", [False, True], ids=["sliding", "fixed"])
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("gdim", "simplices", "degree"), [(2, False, 1), (2, True, 2), (3, False, 1), (3, True, 1), (3, False, 2)]
+)
+def test_tangent(gdim, simplices, degree, case, fixed):
+    friction, slid = CASES[case]
+    b = two(gdim, overhang=0.5, simplices=simplices, degree=degree, comm=MPI.COMM_SELF)
+    pair = b.pair(friction=friction, fixed=fixed, contact=PenaltyContact(20.0), search=0.5)
+    b.state.u_old.x.array[:] = wavy(b.state.V, 1, 0.01)
+    pair.begin(1.0)
+    shift = np.zeros(3)
+    shift[0], shift[gdim - 1] = slid, -0.1
+    b.move(lambda x: shift[:, None] + 0 * x, 1)
+    u = b.state.u.x.array + wavy(b.state.V, 1, 0.01) + wavy(b.state.V, 2, 0.01)
+    w = wavy(b.state.V, 3, 0.02)
+    problem = Assembled(pair, b.state)
+    f, slope = problem.forces(u), problem.matrix(u) @ w
+    remainders = np.array([np.linalg.norm(problem.forces(u + h * w) - f - h * slope) for h in STEPS])
+    remainders /= np.linalg.norm(slope)
+    assert remainders[0] > 1e-8
+    assert slopes(STEPS, remainders).min() > 1.95, remainders
+    np.testing.assert_allclose(problem.forces(u, w), f + slope, atol=1e-12 * np.linalg.norm(slope))
+    assert np.abs(f.reshape(-1, gdim).sum(axis=0)).max() < 1e-13 * np.abs(f).sum()
+
+
+# -- patch test -------------------------------------------------------------------------------------------------------
+
+
+def pressed(b, pair, strain=0.01, material=None):
+    """Press the upper box onto the lower one; sides free, poisson's ratio zero: the stress is uniform."""
+    up = b.gdim - 1
+    path = [0.0 if i < up else (lambda t: -strain * t) for i in range(b.gdim)]
+    supports = b.drive(0, 0, [0.0] * b.gdim, "bottom") + b.drive(1, 1, path, "top")
+    return Mechanics(b.state, [Solid(b.state, material or LinearElastic(E, 0.0)), pair], supports)
+
+
+def stresses(b):
+    """Normal stress in every cell."""
+    up = b.gdim - 1
+    space = fem.functionspace(b.state.mesh, ("DG", 0))
+    values = fem.Function(space)
+    values.interpolate(fem.Expression(E * b.state.u[up].dx(up), space.element.interpolation_points()))
+    return values.x.array[: space.dofmap.index_map.size_local]
+
+
+@pytest.mark.parametrize(("two_pass", "tolerance"), [(False, 0.02), (True, 0.005)], ids=["one pass", "two passes"])
+@pytest.mark.parametrize(("gdim", "simplices", "degree"), [(2, False, 1), (2, True, 1), (3, False, 1), (3, True, 1)])
+def test_patch(gdim, simplices, degree, two_pass, tolerance):
+    b = two(gdim, n=(4, 5), simplices=simplices, degree=degree)
+    pair = b.pair(two_pass=two_pass)
+    mechanics = pressed(b, pair)
+    mechanics.begin(1.0)
+    outcome = mechanics.solve("basic")
+    assert outcome.converged and outcome.iterations <= 3
+    stress = stresses(b)
+    expected = -E * 0.01 / (2 + E / pair.contact.stiffness)
+    error = b.state.mesh.comm.allreduce(np.abs(stress / expected - 1).max(), MPI.MAX)
+    assert error < tolerance
