@@ -1,20 +1,23 @@
 """cutsim: cutting, tearing and blade penetration of soft solids on FEniCSx."""
 
+from cutsim.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.cohesive import Bilinear, CohesiveLaw, Exponential
 from cutsim.conduction import HeatBody
 from cutsim.contact import PenaltyContact
 from cutsim.contact_heat import AdiabaticTool, ContactHeat
 from cutsim.crack_friction import CrackFriction
+from cutsim.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced, piecewise_direction
 from cutsim.friction import Coulomb, FrictionLaw, SmoothCoulomb
 from cutsim.heat_loads import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat_transfer import HeatTransfer
 from cutsim.interface import Crack
 from cutsim.interface_heat import InterfaceHeat
 from cutsim.loads import Support, Traction
-from cutsim.materials import LinearElastic, Material, MooneyRivlin, NeoHookean, StVenantKirchhoff
+from cutsim.materials import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
 from cutsim.mechanics import Mechanics
 from cutsim.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
 from cutsim.points import Surface
+from cutsim.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 from cutsim.schemes import GeneralisedAlpha, Newmark
 from cutsim.solid import Solid
 from cutsim.space import cracked_space
@@ -32,6 +35,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "AdiabaticTool",
+    "ArrudaBoyce",
     "Ball",
     "Bilinear",
     "Blade",
@@ -41,24 +45,31 @@ __all__ = [
     "Coulomb",
     "Crack",
     "CrackFriction",
+    "DispersedFibres",
+    "EllipsoidalFibres",
     "Exponential",
+    "ExponentialFibres",
     "FlatPunch",
     "FrictionLaw",
+    "FungOrthotropic",
     "GeneralisedAlpha",
     "HeatBody",
     "HeatFlux",
     "HeatTransfer",
     "InterfaceHeat",
+    "IsochoricNeoHookean",
     "LinearElastic",
     "Material",
     "Mechanics",
     "MooneyRivlin",
     "NeoHookean",
     "Newmark",
+    "Ogden",
     "Path",
     "PenaltyContact",
     "Plane",
     "PrescribedTemperature",
+    "Reinforced",
     "SmoothCoulomb",
     "Solid",
     "StVenantKirchhoff",
@@ -76,7 +87,10 @@ __all__ = [
     "ToolContact",
     "ToolHeat",
     "Traction",
+    "TransverselyIsotropic",
+    "Yeoh",
     "cracked_space",
+    "piecewise_direction",
     "read_geo",
     "read_msh",
     "run",

@@ -11,7 +11,7 @@ from typing import Protocol, runtime_checkable
 import ufl
 
 from cutsim.checks import require
-from cutsim.kinematics import Expr, green_lagrange, right_cauchy_green, small_strain
+from cutsim.kinematics import Expr, green_lagrange, small_strain
 
 
 @runtime_checkable
@@ -31,6 +31,29 @@ class Material(Protocol):
 
     def plane_stress_stretch(self, F: Expr) -> Expr:
         """Out-of-plane stretch λ₃ that makes the out-of-plane stress vanish, from the in-plane part of F."""
+
+
+def isochoric_invariant(F: Expr) -> Expr:
+    """First invariant Ī₁ = J^(−2/3) tr C of the isochoric part of F."""
+    return ufl.det(F) ** (-2 / 3) * ufl.inner(F, F)
+
+
+def engineering_constants(shear: float, bulk: float) -> tuple[float, float]:
+    """Young's modulus [stress] and Poisson's ratio [–] of shear and bulk modulus."""
+    return 9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear))
+
+
+class WithoutPlaneStress:
+    """A material that leaves the out-of-plane stretch of plane stress open."""
+
+    def plane_stress_stretch(self, F: Expr) -> Expr:
+        """Not available.
+
+        Raises:
+            ValueError: Always.
+        """
+        name = type(self).__name__
+        raise ValueError(f"plane = 'stress' is not available for {name}; use plane = 'strain' or a 3-D mesh")
 
 
 @dataclass(frozen=True)
@@ -57,8 +80,7 @@ class _Isotropic:
         """Make the material from shear modulus G > 0 and bulk modulus K > 0 [stress]."""
         require("shear", shear, shear > 0, "> 0")
         require("bulk", bulk, bulk > 0, "> 0")
-        young = 9 * bulk * shear / (3 * bulk + shear)
-        return cls(young, (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear)))
+        return cls(*engineering_constants(shear, bulk))
 
     @property
     def shear(self) -> float:
@@ -105,6 +127,15 @@ class NeoHookean(_Isotropic):
 
 
 @dataclass(frozen=True)
+class IsochoricNeoHookean(WithoutPlaneStress, _Isotropic):
+    """Nearly incompressible neo-Hookean solid, W = G/2 (Ī₁−3) + K/2 (ln J)² (thesis 2.6); polyconvex for J < e."""
+
+    def energy(self, F: Expr) -> tuple[Expr, Expr]:
+        """Strain energy per reference volume, (fully integrated part, volumetric part)."""
+        return 0.5 * self.shear * (isochoric_invariant(F) - 3), 0.5 * self.bulk * ufl.ln(ufl.det(F)) ** 2
+
+
+@dataclass(frozen=True)
 class StVenantKirchhoff(_Isotropic):
     """St Venant–Kirchhoff solid, W = G E:E + λ/2 (tr E)²: large rotations, small strains."""
 
@@ -132,58 +163,3 @@ class LinearElastic(_Isotropic):
         """λ₃ = 1 + ε₃₃ with ε₃₃ = −λ/(λ+2G) (ε₁₁ + ε₂₂)."""
         strain = small_strain(F)
         return 1 - self.lame / (self.lame + 2 * self.shear) * (strain[0, 0] + strain[1, 1])
-
-
-@dataclass(frozen=True)
-class MooneyRivlin:
-    """Nearly incompressible Mooney–Rivlin solid, W = C₁(Ī₁−3) + C₂(Ī₂−3) + K/2 (ln J)² (thesis 2.9).
-
-    Args:
-        c1: First constant C₁ > 0 [stress].
-        c2: Second constant C₂ ≥ 0 [stress].
-        bulk: Bulk modulus K > 0 [stress].
-
-    Raises:
-        ValueError: A constant is outside its range.
-    """
-
-    c1: float
-    c2: float
-    bulk: float
-
-    def __post_init__(self) -> None:
-        require("c1", self.c1, self.c1 > 0, "> 0")
-        require("c2", self.c2, self.c2 >= 0, ">= 0")
-        require("bulk", self.bulk, self.bulk > 0, "> 0")
-
-    @property
-    def shear(self) -> float:
-        """Shear modulus G = 2 (C₁ + C₂) [stress]."""
-        return 2 * (self.c1 + self.c2)
-
-    @property
-    def young(self) -> float:
-        """Young's modulus of the small-strain limit [stress]."""
-        return 9 * self.bulk * self.shear / (3 * self.bulk + self.shear)
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio of the small-strain limit [–]."""
-        return (3 * self.bulk - 2 * self.shear) / (2 * (3 * self.bulk + self.shear))
-
-    def energy(self, F: Expr) -> tuple[Expr, Expr]:
-        """Strain energy per reference volume, (fully integrated part, volumetric part)."""
-        C = right_cauchy_green(F)
-        J = ufl.det(F)
-        I1 = ufl.tr(C)
-        I2 = 0.5 * (I1**2 - ufl.inner(C, C))
-        distortion = self.c1 * (J ** (-2 / 3) * I1 - 3) + self.c2 * (J ** (-4 / 3) * I2 - 3)
-        return distortion, 0.5 * self.bulk * ufl.ln(J) ** 2
-
-    def plane_stress_stretch(self, F: Expr) -> Expr:
-        """Not available: in plane stress a nearly incompressible solid needs no volumetric stiffness.
-
-        Raises:
-            ValueError: Always.
-        """
-        raise ValueError("plane = 'stress' is not available for MooneyRivlin; use plane = 'strain' or a 3-D mesh")

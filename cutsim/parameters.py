@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import fields
+from dataclasses import fields, is_dataclass
 from typing import Any, TypeVar
 
 from dolfinx import default_scalar_type, fem
@@ -19,16 +19,23 @@ def with_constants(mesh: Mesh, law: Law) -> Law:
 
     Args:
         mesh: Mesh of the forms.
-        law: A dataclass of parameters.  What is not a number is kept, and so is zero, which switches a part of a law
-            off and thus changes its kernel.
+        law: A dataclass of parameters, which may hold tuples and other such dataclasses.  What is not a number is kept,
+            and so is zero, which switches a part of a law off and thus changes its kernel.
     """
     symbolic: Any = copy(law)
     for field in fields(law):  # type: ignore[arg-type]
-        value = getattr(law, field.name)
-        if isinstance(value, int | float) and not isinstance(value, bool) and value != 0:
-            # the dataclasses are frozen, and their checks are for numbers
-            object.__setattr__(symbolic, field.name, fem.Constant(mesh, default_scalar_type(value)))
+        # the dataclasses are frozen, and their checks are for numbers
+        object.__setattr__(symbolic, field.name, _symbolic(mesh, getattr(law, field.name)))
     return symbolic
+
+
+def _symbolic(mesh: Mesh, value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_symbolic(mesh, item) for item in value)
+    if is_dataclass(value):
+        return with_constants(mesh, value)
+    number = isinstance(value, int | float) and not isinstance(value, bool) and value != 0
+    return fem.Constant(mesh, default_scalar_type(value)) if number else value
 
 
 class Schedule:

@@ -11,8 +11,9 @@ SOURCES = Path(cutsim.__file__).parent
 # a module imports from its own layer and those before it
 LAYERS = [
     {"checks", "kinematics", "measures", "compat", "assembly", "options", "parameters", "sizes", "units"},
-    {"materials", "cohesive", "contact", "friction", "tools", "schemes", "thermoelastic", "meshing", "space"},
-    {"state", "terms", "points", "slip", "temperature", "preconditioners", "tangent", "pairing"},
+    {"materials", "stretches", "rubbers", "fibres", "anisotropic", "library"},
+    {"cohesive", "contact", "friction", "tools", "schemes", "thermoelastic", "meshing", "space"},
+    {"state", "terms", "points", "viscoelastic", "slip", "temperature", "preconditioners", "tangent", "pairing"},
     {"heat_balance", "contact_heat", "heat_exchange"},
     {"interface_law", "interface_history", "outer_surface", "pair_kinematics"},
     {"pair_forces", "surface_pass", "surface_pair"},

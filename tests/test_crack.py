@@ -8,8 +8,9 @@ from dolfinx import fem, la
 
 from cutsim.compat import form
 from cutsim.contact import PenaltyContact
-from cutsim.materials import MooneyRivlin, NeoHookean, StVenantKirchhoff
+from cutsim.materials import NeoHookean, StVenantKirchhoff
 from cutsim.mechanics import Mechanics
+from cutsim.rubbers import MooneyRivlin
 from cutsim.stepping import StepControl
 
 PENALTY = PenaltyContact(500.0)

@@ -13,8 +13,9 @@ from cutsim.compat import form
 from cutsim.contact import PenaltyContact
 from cutsim.crack_friction import CrackFriction
 from cutsim.friction import Coulomb, SmoothCoulomb
-from cutsim.materials import LinearElastic, MooneyRivlin, NeoHookean, StVenantKirchhoff
+from cutsim.materials import LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.points import Surface
+from cutsim.rubbers import MooneyRivlin
 from cutsim.tool_contact import ToolContact
 from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
 
