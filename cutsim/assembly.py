@@ -5,7 +5,6 @@ from dolfinx import fem, la
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import coo_array
 
 Array = NDArray[np.float64]
 
@@ -41,13 +40,10 @@ def add_blocks(A: PETSc.Mat, dofs: NDArray[np.int64], blocks: Array) -> None:
         blocks: Shape (blocks, n, n).
     """
     n = dofs.shape[1]
-    numbers, local = np.unique(dofs, return_inverse=True)
-    local = local.reshape(dofs.shape)
-    places = np.repeat(local, n, axis=1).ravel(), np.tile(local, n).ravel()
-    sums = coo_array((blocks.ravel(), places), shape=(len(numbers),) * 2).tocsr()
-    columns = numbers[sums.indices]
-    integers = (a.astype(PETSc.IntType) for a in (sums.indptr, columns))
-    A.setValuesIJV(*integers, sums.data, addv=PETSc.InsertMode.ADD, rowmap=numbers.astype(PETSc.IntType))
+    rows, columns = dofs.astype(PETSc.IntType).ravel(), np.repeat(dofs, n, axis=0).astype(PETSc.IntType)
+    # every row of a block is a row of a matrix in compressed rows, in which rows may repeat
+    starts = np.arange(0, columns.size + 1, n, dtype=PETSc.IntType)
+    A.setValuesIJV(starts, columns.ravel(), blocks.ravel(), addv=PETSc.InsertMode.ADD, rowmap=rows)
 
 
 def moment(comm: MPI.Comm, forces: NDArray[np.float64], arms: NDArray[np.float64], gdim: int) -> Array:

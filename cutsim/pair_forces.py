@@ -29,11 +29,20 @@ def nodes(kinematics: PairKinematics, pairs: Pairs, rows: Indices) -> Indices:
     return np.hstack([kinematics.slave.global_nodes[slave], kinematics.master.global_nodes[pairs.hits.facets[rows]]])
 
 
-def active(pairs: Pairs, tractions: Tractions) -> Indices:
-    """Pairs with a traction or a stiffness, by their place among the hits."""
+def active(kinematics: PairKinematics, pairs: Pairs, tractions: Tractions) -> Indices:
+    """Pairs with a traction or a stiffness, by their place among the hits, in the order of the facets."""
     points = pairs.hits.points
     something = np.any(tractions.values, axis=1) | np.any(tractions.stiffness, axis=(1, 2))
-    return np.flatnonzero(np.asarray(something)[points] & (tractions.weights[points] > 0))
+    rows = np.flatnonzero(np.asarray(something)[points] & (tractions.weights[points] > 0))
+    return rows[np.lexsort((pairs.hits.facets[rows], points[rows] // len(kinematics.tables[0])))]
+
+
+def stencils(kinematics: PairKinematics, pairs: Pairs, rows: Indices) -> tuple[Indices, Indices]:
+    """Places of `active` rows where another slave or master facet begins, and the global nodes from there on."""
+    all_nodes = nodes(kinematics, pairs, rows)
+    new = np.any(np.diff(all_nodes, axis=0, prepend=-1), axis=1)
+    starts = np.flatnonzero(new)
+    return starts, all_nodes[starts]
 
 
 def forces(kinematics: PairKinematics, pairs: Pairs, tractions: Tractions, rows: Indices) -> Array:

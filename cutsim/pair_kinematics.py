@@ -263,7 +263,7 @@ class PairKinematics:
     def _look_around(self, points: Points, nodes: tuple[Array, Array]) -> None:
         """Find the facets that are near each other."""
         count, ray = len(self.tables[0]), self._search * points.frames[:, 0]
-        shape = len(nodes[0]), count, -1
+        shape = len(nodes[0]), count, points.x.shape[-1]
         rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
         self.near = near_facets(rays, nodes[1], self._margin)
         self._seen = nodes

@@ -37,7 +37,8 @@ class Shape:
 
     def values(self, xi: Array) -> tuple[Array, Array]:
         """Shape functions, shape (n, nodes), and their derivatives, shape (n, directions, nodes), at n points."""
-        tables = self.element.tabulate(1, xi)[..., 0]
+        # one more point, because there may be none and basix aborts then
+        tables = self.element.tabulate(1, np.vstack([xi, self.centre]))[:, :-1, :, 0]
         return tables[0], np.moveaxis(tables[1:], 0, 1)
 
     def contains(self, xi: Array) -> NDArray[np.bool_]:

@@ -23,6 +23,9 @@ from cutsim.points import FacetPoints, Values
 from cutsim.slip import SlipHistory, completed
 from cutsim.state import State
 
+# points whose tangents are held in memory at a time
+_CHUNK = 10_000
+
 
 @dataclass(frozen=True)
 class PairLaws:
@@ -192,7 +195,7 @@ class SurfacePass:
         """Add nodal forces, as `cutsim.terms.Term.add_forces`."""
         kinematics, pairs = self._kinematics, self._take()
         tractions = self._tractions(linearised=along is not None)
-        rows = pair_forces.active(pairs, tractions)
+        rows = pair_forces.active(kinematics, pairs, tractions)
         forces = pair_forces.forces(kinematics, pairs, tractions, rows)
         if along is not None:
             change = kinematics.at_stencil(along, pairs, rows)
@@ -203,15 +206,19 @@ class SurfacePass:
     def add_tangent(self, A: PETSc.Mat) -> None:
         """Add the tangent, as `cutsim.terms.Term.add_tangent`."""
         kinematics, pairs, tractions = self._kinematics, self._take(), self._tractions(linearised=True)
-        rows = pair_forces.active(pairs, tractions)
-        dofs = self._dofs(pair_forces.nodes(kinematics, pairs, rows))
-        blocks = pair_forces.tangents(kinematics, pairs, tractions, rows)
-        add_blocks(A, dofs, blocks.reshape(*dofs.shape, -1))
+        rows = pair_forces.active(kinematics, pairs, tractions)
+        for some in np.array_split(rows, 1 + len(rows) // _CHUNK):
+            starts, nodes = pair_forces.stencils(kinematics, pairs, some)
+            if len(starts):
+                blocks = np.add.reduceat(pair_forces.tangents(kinematics, pairs, tractions, some), starts)
+                dofs = self._dofs(nodes)
+                add_blocks(A, dofs, blocks.reshape(*dofs.shape, dofs.shape[1]))
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.terms.Term.add_pattern`."""
         dofs = self._dofs(self._kinematics.near_nodes())
-        add_blocks(A, dofs, np.zeros((*dofs.shape, dofs.shape[1])))
+        for some in np.array_split(dofs, 1 + len(dofs) // _CHUNK):
+            add_blocks(A, some, np.zeros((*some.shape, some.shape[1])))
 
     def _dofs(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-        return (nodes[..., None] * self._dim + np.arange(self._dim)).reshape(len(nodes), -1)
+        return (nodes[..., None] * self._dim + np.arange(self._dim)).reshape(len(nodes), self._dim * nodes.shape[1])

@@ -63,7 +63,8 @@ class Tangent:
             for term in self._terms:
                 term.add_pattern(self._added)
             self._added.assemble()
-            self._forms.assemble()
+            # a matrix in which nothing was inserted would lose its pattern
+            self._assemble_forms(())
             self.A = self._forms.copy()
             self.A.axpy(1.0, self._added, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         self.A.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
@@ -72,6 +73,12 @@ class Tangent:
 
     def assemble(self, bcs: Sequence[fem.DirichletBC]) -> None:
         """Fill the matrix at the present state; constrained rows and columns are those of the identity."""
+        self._assemble_forms(bcs)
+        if self._added is not None:
+            self._add(self._added, bcs)
+        self.A.getDiagonal(self._diagonal)
+
+    def _assemble_forms(self, bcs: Sequence[fem.DirichletBC]) -> None:
         if self._csr is None:
             self._forms.zeroEntries()
             petsc.assemble_matrix(self._forms, self._a, bcs)
@@ -79,9 +86,6 @@ class Tangent:
             self._csr.set_value(0.0)
             fem.assemble_matrix(self._csr, self._a, bcs)
         self._forms.assemble()
-        if self._added is not None:
-            self._add(self._added, bcs)
-        self.A.getDiagonal(self._diagonal)
 
     def _add(self, added: PETSc.Mat, bcs: Sequence[fem.DirichletBC]) -> None:
         added.zeroEntries()
