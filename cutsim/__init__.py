@@ -30,6 +30,7 @@ from cutsim.thermoelastic import ThermoElastic
 from cutsim.tool_contact import ToolContact
 from cutsim.tool_heat import ToolHeat
 from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
+from cutsim.viscoelastic import Prony
 
 __version__ = "0.1.0"
 
@@ -69,6 +70,7 @@ __all__ = [
     "PenaltyContact",
     "Plane",
     "PrescribedTemperature",
+    "Prony",
     "Reinforced",
     "SmoothCoulomb",
     "Solid",

@@ -20,6 +20,7 @@ from cutsim.state import State
 from cutsim.temperature import Temperature
 from cutsim.terms import Term
 from cutsim.thermoelastic import ThermoElastic
+from cutsim.viscoelastic import Overstress, Prony
 
 logger = logging.getLogger(__name__)
 
@@ -39,6 +40,8 @@ class Solid(Term):
         volumetric: "full" or "reduced" integration of the volumetric part; by default reduced for ν ≥ 0.45.
             On simplices of degree 1 both coincide, and a warning says that the element locks.
         viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
+        relaxation: Prony series by which all but the volumetric part relaxes; the material is then the relaxed one.
+            The stresses of the methods below are without overstress.
         density: Mass per reference volume, > 0; needed by dynamics and heat only [mass/length³].
         thermoelastic: Thermal expansion and shear modulus that depends on temperature.
         temperature: The temperature that acts on the body; with `thermoelastic` only.
@@ -60,6 +63,7 @@ class Solid(Term):
         plane: Literal["strain", "stress"] = "strain",
         volumetric: Literal["auto", "full", "reduced"] = "auto",
         viscosity: float = 0.0,
+        relaxation: Prony | None = None,
         density: float | None = None,
         thermoelastic: ThermoElastic | None = None,
         temperature: Temperature | None = None,
@@ -70,6 +74,8 @@ class Solid(Term):
         require("volumetric", volumetric, volumetric in ("auto", "full", "reduced"), "'auto', 'full' or 'reduced'")
         require("viscosity", viscosity, viscosity >= 0, ">= 0")
         require("density", density, density is None or density > 0, "> 0")
+        # there λ₃ would depend on the overstress
+        require("plane", plane, plane == "strain" or relaxation is None, "'strain' for a material that relaxes")
         self.name = name
         self.state = state
         self.material = material
@@ -81,6 +87,7 @@ class Solid(Term):
         self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
         self.measures = self._choose_measures(volumetric)
+        self._overstress = None if relaxation is None else self._relaxing(relaxation)
         self._energy_form = form(self._stored(state.u))
         self._viscous_form = form(self._viscous_work()) if viscosity else None
         self._viscous = self._viscous_old = 0.0
@@ -133,19 +140,29 @@ class Solid(Term):
             E = green_lagrange(deformation_gradient(self.state.u))
             rate = (E - green_lagrange(deformation_gradient(self.state.u_old))) / self.state.dt
             work += self._viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
+        if self._overstress is not None:
+            work += self._overstress.residual(v)
         return work
+
+    def begin(self, time: float) -> None:
+        """Relax the overstress over the step."""
+        if self._overstress is not None:
+            self._overstress.begin()
 
     def evaluate(self) -> None:
         """Add the viscous dissipation of the step, and what the change of temperature adds. Collective."""
         if self._viscous_form is not None:
             self._viscous = self._viscous_old + integrate(self._viscous_form)
+        if self._overstress is not None:
+            self._overstress.evaluate()
         if self.temperature is not None:
             self._thermal = self._thermal_old - integrate(self._heating_form)
             self._temperature_trial = self.temperature.value.x.array.copy()
 
     def energies(self) -> dict[str, float]:
-        """Strain energy, viscous dissipation and minus the strain energy brought by heat so far. Collective."""
-        return {"strain": integrate(self._energy_form), "viscous": self._viscous, "thermoelastic": self._thermal}
+        """Strain energy, work of viscous stresses and minus the strain energy brought by heat so far. Collective."""
+        viscous = self._viscous + (0.0 if self._overstress is None else self._overstress.work)
+        return {"strain": integrate(self._energy_form), "viscous": viscous, "thermoelastic": self._thermal}
 
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""
@@ -166,10 +183,14 @@ class Solid(Term):
     def rollback(self) -> None:
         """Forget the energies of the step."""
         self._viscous, self._thermal = self._viscous_old, self._thermal_old
+        if self._overstress is not None:
+            self._overstress.rollback()
 
     def commit(self) -> None:
         """Adopt the energies, and the temperature at which the step was in equilibrium."""
         self._viscous_old, self._thermal_old = self._viscous, self._thermal
+        if self._overstress is not None:
+            self._overstress.commit()
         if self.temperature is not None:
             self._temperature_seen.x.array[:] = self._temperature_trial
 
@@ -195,6 +216,12 @@ class Solid(Term):
             self.state.measures.cells(self.cells)(metadata={"quadrature_degree": degree}) for degree in degrees
         )
         return first, second
+
+    def _relaxing(self, relaxation: Prony) -> Overstress:
+        F = ufl.variable(self.deformation_gradient(self.state.u))
+        energy = self._energy(F, self._temperature())[0]
+        stress = ufl.inv(F) * ufl.diff(energy, F)
+        return Overstress(self.state, relaxation, energy, stress, self.measures[0], self.cells)
 
     def _temperature(self) -> Expr | None:
         return None if self.temperature is None else self.temperature.value

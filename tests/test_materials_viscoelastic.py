@@ -1,0 +1,240 @@
+"""Prony series against exact convolutions: relaxation, cycles, dissipation, tangent, rollback."""
+
+import numpy as np
+import pytest
+import ufl
+from conftest import NU, E, history, make_blocks, slopes
+from dolfinx import fem, mesh
+from mpi4py import MPI
+from scipy.integrate import quad
+from test_materials import AXIS, MOONEY, name, stress
+from test_tangents import assert_slope_two, smooth
+
+from cutsim.assembly import nodal_forces
+from cutsim.compat import form
+from cutsim.fibres import DispersedFibres, Reinforced
+from cutsim.loads import Support
+from cutsim.materials import IsochoricNeoHookean, NeoHookean, StVenantKirchhoff
+from cutsim.mechanics import Mechanics
+from cutsim.rubbers import Ogden
+from cutsim.solid import Solid
+from cutsim.state import State
+from cutsim.stepping import StepControl
+from cutsim.viscoelastic import Prony
+
+PRONY = Prony((0.5, 0.8), (0.3, 2.0))
+SVK = StVenantKirchhoff(E, NU)
+
+
+class Cube:
+    """The unit cube as one hexahedron, deformed homogeneously with time; x₁ is its driven face."""
+
+    def __init__(self, material, deformation, prony=PRONY):
+        domain = mesh.create_unit_cube(MPI.COMM_SELF, 1, 1, 1, mesh.CellType.hexahedron)
+        self.state = State(fem.functionspace(domain, ("Lagrange", 1, (3,))))
+        self.solid = Solid(self.state, material, relaxation=prony)
+        self._deformation = deformation
+        self._forces = form(self.solid.residual(ufl.TestFunction(self.state.V)))
+        self._driven = np.isclose(self.state.V.tabulate_dof_coordinates()[:, 0], 1.0)
+
+    def step(self, time):
+        """Traction on the driven face and viscous work, after a committed step to a time."""
+        H = np.array(self._deformation(time)) - np.eye(3)
+        self.state.begin(time)
+        self.solid.begin(time)
+        self.state.u.interpolate(lambda x: H @ x)
+        self.solid.evaluate()
+        traction = nodal_forces(self._forces).reshape(-1, 3)[self._driven].sum(axis=0)
+        self.solid.commit()
+        self.state.commit()
+        return traction, self.solid.energies()["viscous"]
+
+    def run(self, times):
+        tractions, works = zip(*(self.step(t) for t in times), strict=True)
+        return np.array(tractions), np.array(works)
+
+
+def straight(times, strains, modulus, at, prony=PRONY):
+    """Σ ∫ gᵢ exp(−(t−s)/τᵢ) modulus dE for a strain that goes straight between instants, exactly."""
+    h = np.zeros_like(at)
+    for g, tau in zip(prony.strengths, prony.times, strict=True):
+        for a, b, rate in zip(times, times[1:], np.diff(strains) / np.diff(times), strict=False):
+            end = np.clip(at, a, b)
+            h += g * modulus * rate * tau * (np.exp((end - at) / tau) - np.exp((a - at) / tau)) * (at > a)
+    return h
+
+
+def uniaxial(strain):
+    """A deformation with a given Green–Lagrange strain along x₁, and no other."""
+    return lambda t: np.diag([np.sqrt(1 + 2 * strain(t)), 1.0, 1.0])
+
+
+LOADS = {
+    "relaxation": ([0.0, 0.2, 9.0], [0.0, 0.3, 0.3]),
+    "cycles": (np.arange(0.0, 8.5, 0.5), [0.0, *[0.2, 0.0, -0.2, 0.0] * 4]),
+}
+
+
+@pytest.mark.parametrize("load", LOADS)
+def test_straight_strain_paths_are_exact(load):
+    """S is linear in E: whatever the steps, those within a straight part of the path are exact."""
+    instants, strains = LOADS[load]
+    cube = Cube(SVK, uniaxial(lambda t: np.interp(t, instants, strains)))
+    rng = np.random.default_rng(0)
+    times = np.unique([*instants[1:], *rng.uniform(0, instants[-1], 30)])
+    tractions, _ = cube.run(times)
+    strain = np.interp(times, instants, strains)
+    total = (2 * SVK.shear + SVK.lame) * strain + straight(instants, strains, 2 * SVK.shear, times)
+    np.testing.assert_allclose(tractions[:, 0], np.sqrt(1 + 2 * strain) * total, atol=1e-12 * E)
+
+
+@pytest.mark.parametrize(
+    "material", [IsochoricNeoHookean(E, 0.45), MOONEY, Ogden((0.5, 0.3), (1.3, -2.0), 2.0)], ids=name
+)
+def test_cyclic_shear_of_nonlinear_solids(material):
+    """Sinusoidal shear: the stress to 1e-6 of the exact convolution, with an error of second order in the step."""
+
+    def F(t):
+        return np.eye(3) + 0.6 * np.sin(2 * t) * np.outer([0, 1, 0], [1, 0, 0])
+
+    def second(t):
+        """Components of S that make the shear traction F S on x₁; no change of volume, no volumetric part."""
+        S = np.linalg.solve(F(t), stress(material, F(t)))
+        return S[0, :2]
+
+    end, step = 2.3, 1e-4
+    h = 0.0
+    for g, tau in zip(PRONY.strengths, PRONY.times, strict=True):
+
+        def rate(s, k, tau=tau):
+            change = (8 * (second(s + step) - second(s - step)) - second(s + 2 * step) + second(s - 2 * step))[k]
+            return np.exp((s - end) / tau) * change / (12 * step)
+
+        h = h + g * np.array([quad(rate, 0, end, args=(k,), epsabs=1e-9, limit=200)[0] for k in (0, 1)])
+    S = second(end) + h
+    exact = F(end)[1, 0] * S[0] + S[1]
+    counts = np.array([50, 100, 800])
+    errors = [abs(Cube(material, F).run(np.linspace(0, end, n + 1)[1:])[0][-1, 1] / exact - 1) for n in counts]
+    assert errors[-1] < 1e-6
+    np.testing.assert_allclose(slopes(1 / counts, errors), 2, atol=0.1)
+
+
+def test_hysteresis_loop_is_the_viscous_work():
+    """Area of the loop of the supports' force, work in the audit, and the closed form; in the steady state."""
+    period, amplitude, cycles, n = 1.0, 0.1, 30, 400
+    prony = Prony((0.5,), (0.3,))
+    instants = np.arange(0, cycles + 0.125, 0.25)
+    strains = np.resize([0.0, amplitude, 0.0, -amplitude], len(instants))
+    coarse = np.setdiff1d(instants, [0.0])[: 4 * (cycles - 1)]
+    fine = np.linspace(cycles - 1, cycles, n + 1)
+    cube = Cube(SVK, uniaxial(lambda t: np.interp(t, instants, strains)), prony)
+    cube.run(coarse)
+    before = cube.solid.energies()["viscous"]
+    tractions, works = cube.run(fine[1:])
+    stretch = np.sqrt(1 + 2 * np.interp(fine, instants, strains))
+    loop = np.trapezoid([tractions[-1, 0], *tractions[:, 0]], stretch)
+    # Maxwell element under a triangular wave: ∮ h dE per cycle of quarter T/4 with slope r
+    tau, quarter, rate = 0.3, period / 4, amplitude / (period / 4)
+    area = 4 * rate**2 * prony.strengths[0] * 2 * SVK.shear * tau * (quarter - tau * np.tanh(quarter / tau))
+    assert works[-1] - before == pytest.approx(loop, rel=1e-6)
+    assert loop == pytest.approx(area, rel=1e-4)
+
+
+def stretched(prony=PRONY, comm=MPI.COMM_WORLD):
+    """Blocks in uniaxial strain by supports, as a boundary value problem with a free interior."""
+    b = make_blocks(3, comm=comm)
+    state = State(fem.functionspace(b.state.mesh, ("Lagrange", 1, (3,))))
+    solid = Solid(state, SVK, relaxation=prony)
+    supports = [Support(state, b.face(i, at), i) for i in range(3) for at in (0.0, 1.0) if (i, at) != (0, 1.0)]
+    supports.append(Support(state, b.face(0, 1.0), 0, lambda t: np.sqrt(1 + 0.6 * min(t, 1.0)) - 1, name="pull"))
+    return Mechanics(state, [solid], supports)
+
+
+@pytest.mark.mpi
+def test_relaxation_of_a_body():
+    """Force of the support against the exact convolution; the audit closes; the same on any number of ranks."""
+    rows = history(stretched(), 5.0, StepControl.fixed(0.1))
+    strain = 0.3 * np.minimum(rows["time"], 1.0)
+    over = straight([0.0, 1.0, 5.0], [0.0, 0.3, 0.3], 2 * SVK.shear, rows["time"])
+    force = np.sqrt(1 + 2 * strain) * ((2 * SVK.shear + SVK.lame) * strain + over)
+    np.testing.assert_allclose(rows["pull_force"], force, rtol=1e-6)
+    assert abs(rows["energy_closure"][-1]) < 1e-3
+    assert rows["energy_viscous"][-1] > 0.1 * rows["energy_strain"][-1]
+
+
+@pytest.mark.mpi
+def test_rollback_is_bit_for_bit():
+    mechanics = stretched()
+    solid = mechanics.terms[0]
+    history(mechanics, 0.5, StepControl.fixed(0.25))
+    forces = form(solid.residual(ufl.TestFunction(mechanics.state.V)))
+
+    def seen():
+        return [nodal_forces(forces), *solid.energies().values()]
+
+    before = seen()
+    mechanics.begin(0.8)
+    assert mechanics.solve().converged
+    mechanics.evaluate()
+    tried = seen()
+    mechanics.rollback()
+    assert not np.array_equal(before[0], tried[0])
+    for a, b in zip(before, seen(), strict=True):
+        assert np.array_equal(a, b)
+    mechanics.begin(0.8)
+    mechanics.solve()
+    mechanics.evaluate()
+    for a, b in zip(tried, seen(), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+FIBRED = Reinforced(NeoHookean(E, NU), (DispersedFibres(AXIS, 0.8, 0.5, 0.1),))
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+@pytest.mark.parametrize("material", [NeoHookean(E, NU), MOONEY, FIBRED], ids=name)
+def test_tangent(material, gdim):
+    b = make_blocks(gdim)
+    solid = b.solid(material, relaxation=PRONY)
+    b.state.begin(0.4)
+    solid.begin(0.4)
+    b.state.u.x.array[:] = smooth(b.state.V, 3, 0.2)
+    solid.evaluate()
+    solid.commit()
+    b.state.commit()
+    b.state.begin(0.6)
+    solid.begin(0.6)
+    assert_slope_two(solid, b.state, smooth(b.state.V, 1, 0.2), 1.0)
+
+
+def test_turning_relaxes_nothing():
+    """Rigid rotation of a stretched body: the overstress turns with it and decays as at rest."""
+    stretch = np.diag([1.3, 0.9, 1.0])
+    angle = 0.7
+
+    def turn(t):
+        c, s = np.cos(angle * t), np.sin(angle * t)
+        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+    def grow(t):
+        return np.eye(3) + min(t, 1.0) * (stretch - np.eye(3))
+
+    times = np.linspace(0.25, 3.0, 12)
+    still, _ = Cube(MOONEY, grow).run(times)
+    turning, _ = Cube(MOONEY, lambda t: turn(t) @ grow(t)).run(times)
+    for t, f, g in zip(times, still, turning, strict=True):
+        np.testing.assert_allclose(g, turn(t) @ f, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("strengths", "times", "name"),
+    [((), (), "strengths"), ((0.0,), (1.0,), "strengths"), ((1.0,), (0.0,), "times"), ((1.0,), (1.0, 2.0), "times")],
+)
+def test_refuses_what_has_no_meaning(strengths, times, name):
+    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+        Prony(strengths, times)
+
+
+def test_plane_stress_is_refused():
+    with pytest.raises(ValueError, match="plane = 'stress' is not allowed"):
+        make_blocks().solid(relaxation=PRONY, plane="stress")
