@@ -11,9 +11,13 @@ from numpy.typing import NDArray
 
 from cutsim.checks import require
 from cutsim.cohesive import CohesiveLaw, separation_curve
+from cutsim.conduction import HeatBody
 from cutsim.contact import PenaltyContact
+from cutsim.contact_heat import AdiabaticTool, ContactHeat
 from cutsim.friction import Coulomb
+from cutsim.heat_transfer import HeatTransfer
 from cutsim.interface import Crack
+from cutsim.interface_heat import InterfaceHeat
 from cutsim.loads import Support
 from cutsim.materials import Material
 from cutsim.mechanics import Mechanics
@@ -22,14 +26,37 @@ from cutsim.points import Surface
 from cutsim.recording import Columns
 from cutsim.solid import Solid
 from cutsim.space import cracked_space
+from cutsim.staggered import ThermoMechanics
 from cutsim.state import State
+from cutsim.temperature import Temperature
 from cutsim.tool_contact import ToolContact, warn_coarse
+from cutsim.tool_heat import ToolHeat
 from cutsim.tools import Blade, Path
 
 # measured on blade cuts: stiff enough for the force, soft enough for Newton's method (pressure per length over E)
 _PENALTY = 5.0
 _BLEND = 0.4
 _TIP_IN_NOTCH = 0.8
+
+
+@dataclass(frozen=True)
+class ThermalCut:
+    """Thermal properties of a blade cut.
+
+    Args:
+        density: Density of the block [mass/length³].
+        capacity: Its specific heat [energy/(mass·temperature)].
+        conductivity: Its conductivity [power/(length·temperature)].
+        blade: Exchange of heat between block ('+') and blade ('−'); an adiabatic blade, or one that stays at the
+            initial temperature.
+        fracture_fraction: Fraction of the fracture dissipation that becomes heat, in [0, 1].
+    """
+
+    density: float
+    capacity: float
+    conductivity: float
+    blade: ContactHeat | AdiabaticTool
+    fracture_fraction: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -135,6 +162,32 @@ class BladeCut:
         """Time at which the tip is this deep below the top [time]."""
         require("depth", depth, depth >= self.tip, f">= {self.tip}, where the push begins")
         return self.insertion + depth - self.tip
+
+    def heated(self, thermal: ThermalCut, initial: float) -> ThermoMechanics:
+        """The cut with heat from friction on the blade and from fracture; the block is insulated elsewhere. Collective.
+
+        Args:
+            thermal: Thermal properties.
+            initial: Initial temperature of block and blade [K].
+
+        Returns:
+            The coupled problem, to run in place of `mechanics`.
+        """
+        space = cracked_space(self.domain.mesh, ("Lagrange", 1), _slit(self.domain))
+        temperature = Temperature(self.state, space, initial)
+        body = HeatBody(
+            temperature,
+            density=thermal.density,
+            capacity=thermal.capacity,
+            conductivity=thermal.conductivity,
+            body=self.solid,
+        )
+        # the faces lie apart wherever the bond has broken: what they exchange before hardly matters
+        faces = ContactHeat(1.0, 1.0, fracture_fraction=thermal.fracture_fraction)
+        blade_temperature = None if isinstance(thermal.blade, AdiabaticTool) else initial
+        tools = [ToolHeat(temperature, half, thermal.blade, blade_temperature) for half in self.halves]
+        heat = HeatTransfer(temperature, [body, InterfaceHeat(temperature, self.crack, faces), *tools])
+        return ThermoMechanics(self.mechanics, heat)
 
     def columns(self, columns: Columns) -> Columns:
         """Depth of the tip, force of the whole blade, its imbalance with the plate, cut area. Collective.

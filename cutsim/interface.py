@@ -21,7 +21,7 @@ from cutsim.cohesive import CohesiveLaw, process_zone_element
 from cutsim.contact import PenaltyContact
 from cutsim.interface_history import InterfaceHistory
 from cutsim.interface_law import Response, respond
-from cutsim.kinematics import Expr, displacement_jump, midsurface_normal, surface_frame
+from cutsim.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
 from cutsim.parameters import with_constants
 from cutsim.points import FacetPoints, Surface, Values
 from cutsim.sizes import facet_size, normal_size
@@ -64,8 +64,6 @@ class Crack(Term):
         contact: Contact law of the closed crack; by default a penalty of 10 E/h.
         penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
         normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
-        closing_range: Jump beyond which closing fades out, because the mid-surface normal of wide-open, rotated
-            faces has no meaning [length]; by default the larger of 3 ε_n and the facet size.
 
     Attributes:
         points: Its integration points, with the facets in the order of all per-facet arrays.
@@ -92,12 +90,10 @@ class Crack(Term):
         contact: PenaltyContact | None = None,
         penetration: float | None = None,
         normal: Literal["current", "reference"] = "current",
-        closing_range: float | None = None,
     ) -> None:
         require("young", young, young > 0, "> 0")
         require("normal", normal, normal in ("current", "reference"), "'current' or 'reference'")
         require("penetration", penetration, penetration is None or penetration > 0, "> 0 or None")
-        require("closing_range", closing_range, closing_range is None or closing_range > 0, "> 0 or None")
         self.name, self.state, self.law = name, state, law
         self._current = normal == "current"
         self._allowed_penetration = penetration
@@ -110,8 +106,6 @@ class Crack(Term):
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         self._symbolic_law = None if law is None else with_constants(state.mesh, law)
         self._symbolic_contact = with_constants(state.mesh, self.contact)
-        floor = 3 * law.opening if law is not None else 0.0
-        self._range = fem.Constant(state.mesh, default_scalar_type(closing_range or max(floor, self.size)))
         self._warn_coarse(young)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
         self.history = InterfaceHistory(self.points)
@@ -149,8 +143,7 @@ class Crack(Term):
         gap = ufl.dot(jump, n)
         slide = jump - gap * n
         multiplier = self.points.at(self.history.multiplier) if self._allowed_penetration else 0.0
-        far = ufl.dot(jump, jump) / self._range**2 - 1
-        fade = ufl.conditional(ufl.gt(far, 0), ufl.exp(-(far**2)), 1.0)
+        fade = facing(u, N) if self._current else ufl.as_ufl(1.0)
         kappa = self.points.at(self.history.kappa)
         r = respond(self._symbolic_law, self._symbolic_contact, gap, slide, kappa, multiplier, fade)
         return CrackResponse(**vars(r), jump=jump, opening=gap, slide=slide, cohesive=r.tension * n + r.shear, normal=n)
@@ -212,10 +205,11 @@ class Crack(Term):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
-        penetration = max(self.points.maximum(-self.history.trial["opening"]), 0.0) / self.normal_size
+        trial = self.history.trial
+        penetration = max(self.points.maximum(np.where(trial["pressure"] > 0, -trial["opening"], 0.0)), 0.0)
         columns = {
             f"{self.name}_opening": (self.points.maximum(self.history.trial["opening"]), "length"),
-            f"{self.name}_penetration": (penetration, "one"),
+            f"{self.name}_penetration": (penetration / self.normal_size, "one"),
         }
         if self.law is not None:
             kind = "length" if self.state.mesh.geometry.dim == 2 else "area"

@@ -69,6 +69,22 @@ def midsurface_normal(u: Expr, N: Expr) -> Expr:
     return n / ufl.sqrt(ufl.dot(n, n))
 
 
+def facing(u: Expr, N: Expr) -> Expr:
+    """Whether the two faces of a crack face each other, 1 if they do and 0 if not.
+
+    Falls smoothly from 1 to 0 while the current normals of the faces turn from 60° to 90° against each other.  Faces
+    that have turned further apart cannot touch, and the normal of their mid-surface has no meaning.
+
+    Args:
+        u: Displacement on a cracked space (unrestricted).
+        N: Reference facet normal of the mesh (unrestricted).
+    """
+    plus, minus = (cofactor(ufl.Identity(len(u)) + ufl.grad(u)(side)) * N("+") for side in ("+", "-"))
+    x = 2 * ufl.dot(plus, minus) / ufl.sqrt(ufl.dot(plus, plus) * ufl.dot(minus, minus))
+    rising = ufl.conditional(ufl.gt(x, 0), x**2 * (3 - 2 * x), 0.0)
+    return ufl.conditional(ufl.lt(x, 1), rising, 1.0)
+
+
 def surface_frame(u: Expr, mesh: Any, n: Expr, *, current: bool) -> tuple[Expr, ...]:
     """Unit tangents of a crack that turn with its mid-surface: components along them are objective.
 

@@ -149,7 +149,7 @@ class Beam:
         open_facets, bond_facets = domain.facets("precrack"), domain.facets("crack")
         state = State(cracked_space(domain.mesh, ("Lagrange", 2, (2,)), [open_facets, bond_facets][: 1 + grows]))
         solid = Solid(state, specimen.material)
-        common = dict(young=young, normal="reference", closing_range=h)
+        common = dict(young=young, normal="reference")
         contact = PenaltyContact.automatic(young, h, factor=3.0, blend=1e-5 * h)
         lower = domain.cells("lower")
         faces = Crack(state, open_facets, lower, name="faces", contact=contact, **common)

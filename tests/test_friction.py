@@ -190,7 +190,7 @@ def test_where_friction_acts(acts_on, caplog):
     kappa, slide = 2.0 * EXPONENTIAL.eps_n, 0.1
     for opening in (-DEPTH, 0.5 * EXPONENTIAL.eps_n):
         b = make_blocks()
-        crack = b.crack(EXPONENTIAL, contact=PenaltyContact(NORMAL), closing_range=10.0)
+        crack = b.crack(EXPONENTIAL, contact=PenaltyContact(NORMAL))
         crack.points.set(crack.history.kappa, np.full_like(crack.points.weights, kappa))
         friction = CrackFriction(crack, Coulomb(MU, 1e6), acts_on=acts_on)
         mechanics = Mechanics(b.state, [crack, friction], b.drive(b.lower, [0.0, 0.0]))

@@ -64,7 +64,7 @@ class Slabs:
         for cells, value in zip((b.lower, b.upper), initial, strict=True):
             start.interpolate(lambda x, value=value: np.full(x.shape[1], value), cells)
         self.T = Temperature(b.state, space, start)
-        crack = b.crack(None, contact=PenaltyContact(STIFFNESS), closing_range=1e3)
+        crack = b.crack(None, contact=PenaltyContact(STIFFNESS))
         still, moved = [0.0] * gdim, [0.0] * (gdim - 1) + [lambda _: -depth]
         mechanics = Mechanics(b.state, [b.solid(), crack], b.drive(b.lower, still) + b.drive(b.upper, moved))
         bodies = [

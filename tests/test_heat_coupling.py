@@ -168,7 +168,7 @@ def clamped_pair(iterate, conductance=50.0):
     T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
     law = ThermoElastic(1e-4, 300.0)
     solid = b.solid(LinearElastic(E, NU), thermoelastic=law, temperature=T, density=1.0)
-    crack = b.crack(None, contact=PenaltyContact(200.0), normal="reference", closing_range=1e3)
+    crack = b.crack(None, contact=PenaltyContact(200.0), normal="reference")
     walls = [Support(b.state, b.face(1, at), 1) for at in (0.0, 1.0)]
     sides = [Support(b.state, np.concatenate([b.face(0, 0.0), b.face(0, 1.0)]), 0)]
     mechanics = Mechanics(b.state, [solid, crack], walls + sides, rtol=1e-11)

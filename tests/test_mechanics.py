@@ -179,7 +179,6 @@ def test_reactions_balance_a_dead_load():
         (lambda b: b.crack(young=0.0), "young"),
         (lambda b: b.crack(normal="mean"), "normal"),
         (lambda b: b.crack(penetration=0.0), "penetration"),
-        (lambda b: b.crack(closing_range=-1.0), "closing_range"),
         (lambda b: b.crack().point_values("nonsense"), "name"),
     ],
 )
