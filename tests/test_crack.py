@@ -211,7 +211,7 @@ def test_faces_that_have_turned_apart_do_not_touch(gdim):
     assert opening < 0 and np.abs(forces()).max() > 1.0, "pressed faces at 40° to each other do touch"
     for degrees in (50, 100, 135):
         b.move(turn(-degrees, 0.0), turn(degrees, 0.0))
-        assert np.abs(forces()).max() == 0.0
+        assert np.abs(forces()).max() < 1e-12
     assert crack._evaluate_at(1.0)["opening"].min() < 0, "the test needs a mid-surface that is turned over"
 
 

@@ -55,6 +55,12 @@ def test_user_guide(tmp_path, monkeypatch):
     assert {path.name for path in (tmp_path / "results").iterdir()} >= {"history.csv", "displacement.bp", "force.png"}
 
 
+def test_friction():
+    last = run_page("friction")["rows"][-1]
+    assert last["crack_slipping"][0] == pytest.approx(1.0), "the page's block slips in the end"
+    assert last["energy_friction"][0] > 0 and abs(last["energy_closure"][0]) < 1e-2
+
+
 def test_dynamics():
     momenta = run_page("dynamics")["momenta"]
     assert len(momenta) > 50
