@@ -1,13 +1,31 @@
 """What the points of an interface remember: damage, multiplier, work along the path (docs/theory.md §3.2)."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from cutsim.points import FacetPoints, Values
 
-# Gauss points on the straight path of the displacement over a step, on which interface work is integrated
-_PATH, _PATH_WEIGHTS = (0.5 * (a + b) for a, b in zip(np.polynomial.legendre.leggauss(5), (1.0, 0.0), strict=True))
+
+@dataclass(frozen=True)
+class PathRule:
+    """Where on the straight path of the displacement over a step interface work is evaluated.
+
+    Args:
+        places: Fractions of the step.
+        weights: Their weights.
+    """
+
+    places: tuple[float, ...]
+    weights: tuple[float, ...]
+
+
+#: Five Gauss points, for a law that softens within a step.
+GAUSS = PathRule(*(tuple(0.5 * (a + b)) for a, b in zip(np.polynomial.legendre.leggauss(5), (1.0, 0.0), strict=True)))
+#: The ends, as for the work of the supports: for points that meet or lose their partner within a step.
+TRAPEZOID = PathRule((0.0, 1.0), (0.5, 0.5))
+
 _COLUMNS = (
     "demand", "cohesive_power", "contact_power", "stored", "damage", "opening", "sliding", "pressure",
 )  # fmt: skip
@@ -22,6 +40,8 @@ class InterfaceHistory:
 
     Args:
         points: Integration points.
+        rule: Where work is evaluated.
+        also: Names of further values that are told of the points.
 
     Attributes:
         kappa: Largest demand before this step, a function of the points.
@@ -29,18 +49,18 @@ class InterfaceHistory:
         trial: Values at the end of the trial step, by name.
     """
 
-    def __init__(self, points: FacetPoints) -> None:
-        self._points = points
+    def __init__(self, points: FacetPoints, rule: PathRule = GAUSS, also: tuple[str, ...] = ()) -> None:
+        self._points, self._rule = points, rule
         self.kappa, self.multiplier = points.function(), points.function()
         self._multiplier_old = self.multiplier.x.array.copy()
         zero = np.zeros_like(points.weights)
-        self.trial = self._trial_old = dict.fromkeys(_COLUMNS, zero)
+        self.trial = self._trial_old = dict.fromkeys((*_COLUMNS, *also), zero)
         self._work = self._work_old = {"cohesive": zero, "contact": zero}
 
     def evaluate(self, along: Along) -> None:
         """Trial values, and the work of the step integrated along the path of the displacement. Collective."""
         self._work = {name: work.copy() for name, work in self._work_old.items()}
-        for s, weight in zip(_PATH, _PATH_WEIGHTS, strict=True):
+        for s, weight in zip(self._rule.places, self._rule.weights, strict=True):
             values = along(s)
             for name in self._work:
                 self._work[name] += weight * values[f"{name}_power"]

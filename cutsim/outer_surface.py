@@ -78,7 +78,7 @@ class SharedSurface:
         self.global_nodes, self.sides, self.reference = (np.concatenate(part) for part in zip(*parts, strict=True))
         # a rank owns consecutive nodes: what the ranks send one after the other is in ascending order
         numbers, places = np.unique(self.global_nodes, return_inverse=True)
-        self._places: Indices = places.reshape(self.global_nodes.shape)
+        self._places: NDArray[np.intp] = places.reshape(self.global_nodes.shape)
         first, last = V.dofmap.index_map.local_range
         self._own = numbers[(numbers >= first) & (numbers < last)] - first
         self._counts = np.array(self._comm.allgather(len(self._own) * self._gdim))
@@ -86,17 +86,16 @@ class SharedSurface:
     def gather(self, values: Array) -> Array:
         """Values on the facets, shape (facets, nodes, components), of an array over the local dofs of each rank."""
         mine = np.ascontiguousarray(values.reshape(-1, self._gdim)[self._own])
-        everything = np.empty((int(self._counts.sum()) // self._gdim, self._gdim))
+        everything: Array = np.empty(int(self._counts.sum()))
         self._comm.Allgatherv(mine, [everything, self._counts])
-        on_facets: Array = everything[self._places]
-        return on_facets
+        return everything.reshape(-1, self._gdim)[self._places]
 
 
 def normals(tangents: Array) -> Array:
     """Normals t^⊥ = (t_y, −t_x) or t₁ × t₂, not of unit length, of tangents with shape (…, directions, dimension)."""
     if tangents.shape[-1] == 2:
         return np.stack([tangents[..., 0, 1], -tangents[..., 0, 0]], axis=-1)
-    return np.cross(tangents[..., 0, :], tangents[..., 1, :])
+    return np.asarray(np.cross(tangents[..., 0, :], tangents[..., 1, :]))
 
 
 def _cells_of(mesh: Mesh, facets: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:

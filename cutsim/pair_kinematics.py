@@ -174,11 +174,10 @@ class PairKinematics:
         nodes = slave.reference, master.reference
         points = self._points(nodes[0])
         self._look_around(points, nodes)
-        self._old, self._old_nodes = points, nodes
+        self._old, self._old_nodes, self._old_hits = points, nodes, self._hits(points, nodes)
         self._slid: Array = np.zeros((len(points.x), points.x.shape[-1] - 1))
+        self._offset = np.zeros_like(points.x)
         if fixed:
-            self._hits = self._project(points, nodes[1])
-            self._offset = np.zeros_like(points.x)
             self._offset = self.pairs(nodes).jump
 
     def nodes(self, u: Array) -> tuple[Array, Array]:
@@ -202,6 +201,8 @@ class PairKinematics:
     def begin(self, nodes: tuple[Array, Array]) -> None:
         """Take a configuration for the start of a step."""
         self._old, self._old_nodes = self._points(nodes[0]), nodes
+        if not self.fixed:
+            self._old_hits = self._hits(self._old, nodes)
 
     def commit(self, pairs: "Pairs") -> None:
         """Keep the slide at the end of a step."""
@@ -210,12 +211,7 @@ class PairKinematics:
     def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
         """Points and partners for nodes of slave and master facets."""
         points = self._points(nodes[0])
-        if self.fixed:
-            hits = self._hits
-        else:
-            if self._moved(nodes):
-                self._look_around(points, nodes)
-            hits = self._project(points, nodes[1])
+        hits = self._old_hits if self.fixed else self._hits(points, nodes)
         values, derivatives = self.master.shape.values(hits.xi)
         y = nodes[1][hits.facets]
         distance = np.einsum("nb,nbi->ni", values, y) - points.x[hits.points]
@@ -224,6 +220,7 @@ class PairKinematics:
             jump, rate = self._fixed_jump(points, hits, distance), None
         else:
             jump, rate = self._sliding_jump(hits, values, derivatives)
+            self._slide_of_lost(points, hits, nodes[1], jump)
         return Pairs(points, hits, values, derivatives, jump, rate, distance, tangents)
 
     def _fixed_jump(self, points: Points, hits: Hits, distance: Array) -> Array:
@@ -245,15 +242,26 @@ class PairKinematics:
         rate[:, 1:] = -np.einsum("nai,nkb,nbi->nak", frames, derivatives, y)
         return jump, rate
 
+    def _slide_of_lost(self, points: Points, hits: Hits, master: Array, jump: Array) -> None:
+        """Slide of points that have lost their partner in this step, against the one they had: friction did work."""
+        lost = ~np.isin(self._old_hits.points, hits.points)
+        rows, facets = self._old_hits.points[lost], self._old_hits.facets[lost]
+        values = self.master.shape.values(self._old_hits.xi[lost])[0]
+        for sign, at, y in ((1, points, master), (-1, self._old, self._old_nodes[1])):
+            distance = np.einsum("nb,nbi->ni", values, y[facets]) - at.x[rows]
+            jump[rows, 1:] += sign * np.einsum("nai,ni->na", at.frames[rows, 1:], distance)
+
     def _points(self, nodes: Array) -> Points:
         return Points.on(nodes, self.slave.sides, self.tables)
 
-    def _project(self, points: Points, master: Array) -> Hits:
+    def _hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
+        if self._moved(nodes):
+            self._look_around(points, nodes)
         count = len(self.tables[0])
         slaves, masters = self.near
         of_facet = slaves[:, None] * count + np.arange(count)
         pairs = of_facet.ravel(), np.repeat(masters, count)
-        return project(points.x, points.frames, pairs, master, self.master.sides, self.master.shape, self._search)
+        return project(points.x, points.frames, pairs, nodes[1], self.master.sides, self.master.shape, self._search)
 
     def _moved(self, nodes: tuple[Array, Array]) -> bool:
         """Whether the surfaces may have come nearer than the margin since they were last searched."""

@@ -13,7 +13,7 @@ from cutsim.assembly import add_blocks
 from cutsim.cohesive import CohesiveLaw
 from cutsim.contact import PenaltyContact
 from cutsim.friction import FrictionLaw
-from cutsim.interface_history import InterfaceHistory
+from cutsim.interface_history import GAUSS, TRAPEZOID, InterfaceHistory
 from cutsim.interface_law import respond
 from cutsim.pair_forces import Tractions
 from cutsim.pair_kinematics import PairKinematics, Pairs
@@ -70,7 +70,7 @@ class SurfacePass:
         own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
         self._weights = weight * own.ravel()
         self._jump = points.function(self._dim)
-        self.history = InterfaceHistory(points)
+        self.history = InterfaceHistory(points, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
         self.slip: SlipHistory | None = None
         self._seen: Array | None = None
         self._take()
@@ -94,6 +94,7 @@ class SurfacePass:
             "damage": r.damage[0],
             "sliding": r.sliding,
             "pressure": r.pressure,
+            "held": contact.energy(-jump[0]),
         }
         if laws.friction is not None:
             friction = completed(laws.friction, laws.contact.stiffness)
@@ -163,8 +164,14 @@ class SurfacePass:
         }
 
     def energies(self) -> dict[str, float]:
-        """Energies of the pass, by entry of the audit."""
+        """Energies of the pass, by entry of the audit.
+
+        Where normals of facets differ, pressure does work on a slide at constant penetration: work that the penalty
+        does not hold is numerical.
+        """
         total = {**self.history.energies(), "friction": 0.0}
+        held = self.points.integral(self.history.trial["held"])
+        total |= {"contact": held, "numerical": total["contact"] - held}
         for entry, value in (self.slip.energies() if self.slip is not None else {}).items():
             total[entry] += value
         return {entry: self._weight * value for entry, value in total.items()}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import basix.ufl
 import numpy as np
 import pytest
-from conftest import slopes
+from conftest import EXPONENTIAL, history, rotation, slopes
 from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -13,10 +13,11 @@ from petsc4py import PETSc
 from cutsim.contact import PenaltyContact
 from cutsim.friction import Coulomb
 from cutsim.loads import Support
-from cutsim.materials import LinearElastic
+from cutsim.materials import LinearElastic, NeoHookean
 from cutsim.mechanics import Mechanics
 from cutsim.solid import Solid
 from cutsim.state import State
+from cutsim.stepping import StepControl
 from cutsim.surface_pair import SurfacePair
 
 E = 2.0
@@ -208,3 +209,172 @@ def test_patch(gdim, simplices, degree, two_pass, tolerance):
     expected = -E * 0.01 / (2 + E / pair.contact.stiffness)
     error = b.state.mesh.comm.allreduce(np.abs(stress / expected - 1).max(), MPI.MAX)
     assert error < tolerance
+
+
+# -- sliding ----------------------------------------------------------------------------------------------------------
+
+LINE_SEARCHES = ("basic", "bt")
+
+
+def drawn(gdim, steps, slave=0, mu=0.3):
+    """A soft block, pressed on a rigid slab and drawn over three of its facets; the pair and its history."""
+    up, across = gdim - 1, [0.0] * (gdim - 2)
+    if gdim == 2:
+        b = stack(((0.0, -0.5), (4.0, 0.0), (13, 1)), ((0.2, 0.0), (1.2, 1.0), (4, 4)))
+    else:
+        b = stack(((0.0, -0.5, -0.5), (4.0, 1.5, 0.0), (13, 6, 1)), ((0.2, 0.0, 0.0), (1.2, 1.0, 1.0), (3, 3, 3)))
+    faces = b.face(0, up, 1), b.face(1, up, 0)
+    pair = SurfacePair(b.state, faces[slave], faces[1 - slave], young=E, friction=Coulomb(mu))
+    rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
+    path = [lambda t: max(t - 1, 0.0), *across, lambda t: -0.05 * min(t, 1.0)]
+    mechanics = Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), pair], rigid + b.drive(1, 1, path, "top"))
+    press = history(mechanics, 1.0, StepControl(first=0.5, largest=0.5, line_searches=LINE_SEARCHES))
+    draw = history(mechanics, 2.0, StepControl(first=1 / steps, largest=1 / steps, line_searches=LINE_SEARCHES))
+    return pair, {name: np.append(press[name], draw[name]) for name in press}
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_block_drawn_over_facets(gdim):
+    """The points are on the flat slab: their normals, and with them the ratio of the forces, are exact."""
+    ends = []
+    for steps in (5, 10):
+        pair, rows = drawn(gdim, steps)
+        normal, shear = rows[f"pair_force_{'xyz'[gdim - 1]}"], rows["pair_force_x"]
+        assert rows["pair_sticking"][1] > 0 and rows["pair_sticking"][-1] == 0
+        np.testing.assert_allclose(shear[-1], -0.3 * normal[-1], rtol=1e-6)
+        np.testing.assert_allclose(rows["top_x_force"], shear, rtol=1e-6, atol=1e-8 * abs(normal[-1]))
+        ends.append((normal[-1], shear[-1]))
+    np.testing.assert_allclose(*ends, rtol=1e-5)
+    assert pair.passes[0].pattern > 3, "the block is to pass over facets that it was not near before"
+
+
+def test_energy_of_a_drawn_block_closes_with_the_steps():
+    closures = []
+    for steps in (10, 20, 40):
+        rows = drawn(2, steps, slave=1)[1]
+        closures.append(abs(rows["energy_closure"][-1]))
+        assert (np.diff(rows["energy_friction"]) >= 0).all()
+        friction = rows["energy_friction"][-1]
+        assert abs(rows["energy_numerical"][-1]) < 0.03 * friction
+    assert closures[0] / closures[2] > 8 and closures[2] < 2e-3, closures
+
+
+# -- objectivity ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fixed", [False, True], ids=["sliding", "fixed"])
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_rotation_of_a_stuck_interface(gdim, fixed):
+    """Both bodies turn by 90° in three steps: the forces turn with them, and nothing slips."""
+    b = two(gdim, overhang=0.5, comm=MPI.COMM_SELF)
+    pair = b.pair(friction=Coulomb(5.0, 7.0), fixed=fixed, contact=PenaltyContact(20.0), search=0.5)
+    problem = Assembled(pair, b.state)
+    pair.begin(1.0)
+    shift = np.zeros(3)
+    shift[0], shift[gdim - 1] = 0.02, -0.05
+    b.move(lambda x: shift[:, None] + 0 * x, 1)
+    b.state.u.x.array[:] += wavy(b.state.V, 1, 0.002)
+    sheared = b.state.u.x.array.copy()
+    x = b.state.V.tabulate_dof_coordinates()[:, :gdim]
+    forces = problem.forces(sheared).reshape(-1, gdim)
+    for angle in (0.0, 30.0, 60.0, 90.0):
+        turn = rotation(gdim, np.deg2rad(angle))
+        if angle:
+            pair.begin(1.0)
+        b.state.u.x.array[:] = ((x + sheared.reshape(-1, gdim)) @ turn.T - x).ravel()
+        pair.evaluate()
+        now = problem.forces(b.state.u.x.array.copy()).reshape(-1, gdim)
+        np.testing.assert_allclose(now, forces @ turn.T, atol=1e-8 * np.abs(forces).max())
+        pair.commit()
+        b.state.commit()
+    assert abs(forces[:, 0]).max() > 0.1 * abs(forces).max()
+    assert pair.energies()["friction"] == 0
+
+
+# -- bond -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_bond_between_meshes_that_do_not_match(gdim):
+    """Pulled and sheared apart as a whole: force and work of separation of the law, whatever the meshes."""
+    b = two(gdim)
+    pair = b.pair(law=EXPONENTIAL, fixed=True)
+    up = gdim - 1
+    top = [0.0] * up + [lambda t: t]
+    rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
+    moved = [Support(b.state, b.cells(1), i, v, dim=gdim, name=f"top_{'xyz'[i]}") for i, v in enumerate(top)]
+    mechanics = Mechanics(b.state, [Solid(b.state, LinearElastic(E, 0.3)), pair], rigid + moved)
+    rows = history(mechanics, 1.0, StepControl(first=0.1, largest=0.1))
+    force, opening = rows[f"top_{'xyz'[up]}_force"], rows["time"] / EXPONENTIAL.eps_n
+    strength = EXPONENTIAL.toughness[0] / (np.e * EXPONENTIAL.eps_n)
+    np.testing.assert_allclose(force, strength * opening * np.exp(1 - opening), rtol=1e-8)
+    np.testing.assert_allclose(rows["energy_fracture"][-1], EXPONENTIAL.toughness[0], rtol=5e-3)
+    np.testing.assert_allclose(rows["pair_broken"][-1], 1.0, rtol=5e-3)
+
+
+# -- state ------------------------------------------------------------------------------------------------------------
+
+
+def test_rollback():
+    """A step that is given up leaves no trace: the next one goes bit for bit as if it had not been."""
+    ends = []
+    for disturbed in (False, True):
+        b = two(2, overhang=0.5)
+        pair = b.pair(friction=Coulomb(0.3))
+        path = [lambda t: 0.1 * t, lambda t: -0.02 * min(t, 1)]
+        supports = b.drive(0, 0, [0.0, 0.0]) + b.drive(1, 1, path)
+        mechanics = Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), pair], supports)
+        for end in (1.0, 1.5):
+            if disturbed:
+                mechanics.begin(end + 0.05)
+                assert mechanics.solve("basic").converged
+                mechanics.evaluate()
+                mechanics.rollback()
+            mechanics.begin(end)
+            assert mechanics.solve("basic").converged
+            mechanics.evaluate()
+            mechanics.commit()
+        ends.append([b.state.u.x.array, pair.force(), *mechanics.audit.entries.values()])
+    for one, other in zip(*ends, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+BAD = {
+    "young": {"young": 0.0},
+    "search": {"search": -1.0},
+    "fixed": {"law": EXPONENTIAL},
+}
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("name", BAD)
+def test_refusal(name):
+    with pytest.raises(ValueError, match=name):
+        two(2).pair(**BAD[name])
+
+
+@pytest.mark.mpi
+def test_refusal_of_one_surface_with_itself():
+    b = two(2)
+    with pytest.raises(ValueError, match="slave_facets"):
+        SurfacePair(b.state, b.face(1, 1, 0), b.face(1, 1, 0), young=E)
+
+
+@pytest.mark.mpi
+def test_same_on_any_number_of_ranks():
+    """The rows of a run on one rank, and of the same run on all of them."""
+    if MPI.COMM_WORLD.size == 1:
+        pytest.skip("compares several ranks with one")
+    ends = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        b = two(3, overhang=0.5, comm=comm)
+        pair = b.pair(friction=Coulomb(0.3), two_pass=True)
+        path = [lambda t: 0.2 * t, 0.0, lambda t: -0.05 * min(t, 1)]
+        supports = b.drive(0, 0, [0.0] * 3) + b.drive(1, 1, path, "top")
+        mechanics = Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), pair], supports)
+        rows = history(mechanics, 2.0, StepControl(first=0.5, largest=0.5, line_searches=LINE_SEARCHES))
+        ends.append({k: v for k, v in rows.items() if "closure" not in k})
+    for name in ends[0]:
+        scale = np.abs(ends[0]["pair_force_z"]).max() if "force" in name else 1.0
+        np.testing.assert_allclose(ends[1][name], ends[0][name], rtol=1e-7, atol=1e-8 * scale, err_msg=name)
