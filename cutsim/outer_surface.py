@@ -15,10 +15,11 @@ class OuterSurface:
     """Facets of the outer boundary and the nodes of the displacement on them.
 
     Args:
-        V: Displacement space of degree 1 or 2.
+        V: Space of a scalar or a vector, of degree 1 or 2.
         facets: Local exterior facets, ghosts included.
 
     Attributes:
+        facets: The facets.
         shape: Reference shape of the facets.
         cells: Cell of each facet.
         local: Number of the facet within its cell.
@@ -30,13 +31,13 @@ class OuterSurface:
 
     def __init__(self, V: fem.FunctionSpace, facets: NDArray[np.int32]) -> None:
         mesh = V.mesh
-        self.V, self._gdim = V, mesh.geometry.dim
+        self.V, self.facets, gdim = V, facets, mesh.geometry.dim
         self.cells, self.local = _cells_of(mesh, facets)
         self.owned = self.cells < mesh.topology.index_map(mesh.topology.dim).size_local
         self.shape, orders = _facet_orders(V)
         dofs = V.dofmap.list
         self.nodes: NDArray[np.int32] = dofs[self.cells[:, None], orders[self.local]]
-        x = V.tabulate_dof_coordinates()[:, : self._gdim]
+        x = V.tabulate_dof_coordinates()[:, :gdim]
         self.reference = x[self.nodes]
         inside = x[dofs[self.cells]].mean(axis=1)
         tangents = np.einsum("ab,fbi->fai", self.shape.values(self.shape.centre[None])[1][0], self.reference)
@@ -51,7 +52,7 @@ class OuterSurface:
 
     def gather(self, values: Array) -> Array:
         """Values on the facets, shape (facets, nodes, components), of an array over the local dofs."""
-        return values.reshape(-1, self._gdim)[self.nodes]
+        return values.reshape(-1, self.V.dofmap.index_map_bs)[self.nodes]
 
     def maximum(self, value: float) -> float:
         """Largest of one value a rank. Collective."""
@@ -65,6 +66,7 @@ class SharedSurface:
         surface: The facets of this rank.
 
     Attributes:
+        surface: The facets of this rank.
         shape, sides, reference: As of `OuterSurface`, for the facets of all ranks.
         global_nodes: Global nodes of each facet.
     """
@@ -72,7 +74,7 @@ class SharedSurface:
     def __init__(self, surface: OuterSurface) -> None:
         V = surface.V
         self._comm: MPI.Comm = V.mesh.comm
-        self.shape, self._gdim = surface.shape, V.mesh.geometry.dim
+        self.surface, self.shape, self._components = surface, surface.shape, V.dofmap.index_map_bs
         own = surface.owned
         parts = self._comm.allgather((surface.global_nodes[own], surface.sides[own], surface.reference[own]))
         self.global_nodes, self.sides, self.reference = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -81,14 +83,14 @@ class SharedSurface:
         self._places: NDArray[np.intp] = places.reshape(self.global_nodes.shape)
         first, last = V.dofmap.index_map.local_range
         self._own = numbers[(numbers >= first) & (numbers < last)] - first
-        self._counts = np.array(self._comm.allgather(len(self._own) * self._gdim))
+        self._counts = np.array(self._comm.allgather(len(self._own) * self._components))
 
     def gather(self, values: Array) -> Array:
         """Values on the facets, shape (facets, nodes, components), of an array over the local dofs of each rank."""
-        mine = np.ascontiguousarray(values.reshape(-1, self._gdim)[self._own])
+        mine = np.ascontiguousarray(values.reshape(-1, self._components)[self._own])
         everything: Array = np.empty(int(self._counts.sum()))
         self._comm.Allgatherv(mine, [everything, self._counts])
-        return everything.reshape(-1, self._gdim)[self._places]
+        return everything.reshape(-1, self._components)[self._places]
 
 
 def normals(tangents: Array) -> Array:
@@ -112,7 +114,7 @@ def _cells_of(mesh: Mesh, facets: NDArray[np.int32]) -> tuple[NDArray[np.int32],
 def _facet_orders(V: fem.FunctionSpace) -> tuple[Shape, NDArray[np.int32]]:
     """Reference shape of the facets, and for each facet of a cell its nodes in the order of that shape."""
     cell = V.element.basix_element
-    require("degree", cell.degree, cell.degree in (1, 2), "1 or 2: displacement of the surfaces of a pair")
+    require("degree", cell.degree, cell.degree in (1, 2), "1 or 2: fields on the surfaces of a pair")
     tdim = V.mesh.topology.dim
     kind = basix.cell.subentity_types(cell.cell_type)[tdim - 1][0]
     element = basix.create_element(basix.ElementFamily.P, kind, cell.degree, cell.lagrange_variant)

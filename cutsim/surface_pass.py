@@ -57,6 +57,9 @@ class SurfacePass:
 
     Attributes:
         points: Integration points.
+        kinematics: Finds their partners.
+        weight: Factor of the virtual work.
+        weights: Weights of the points, flattened, times the factor; zero where another rank adds them.
         history: What they remember of opening and damage.
         slip: What they remember of friction, or None.
         force: Force on the slave surface in the trial state [force].
@@ -65,15 +68,15 @@ class SurfacePass:
     def __init__(
         self, state: State, points: FacetPoints, kinematics: PairKinematics, laws: PairLaws, *, weight: float
     ) -> None:
-        self._state, self.points, self._kinematics, self._weight = state, points, kinematics, weight
+        self._state, self.points, self.kinematics, self.weight = state, points, kinematics, weight
         self._dim = state.mesh.geometry.dim
         own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
-        self._weights = weight * own.ravel()
+        self.weights = weight * own.ravel()
         self._jump = points.function(self._dim)
         self.history = InterfaceHistory(points, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
         self.slip: SlipHistory | None = None
         self._seen: Array | None = None
-        self._take()
+        self.partners()
         self._write(laws)
         self.force = self._force_old = np.zeros(self._dim)
 
@@ -112,16 +115,16 @@ class SurfacePass:
         values = self._linear() if linearised else self._traction()
         traction = values["traction"].reshape(-1, self._dim)
         stiffness = values["stiffness"] if linearised else np.zeros((len(traction), self._dim, self._dim))
-        return Tractions(traction, stiffness.reshape(-1, self._dim, self._dim), self._weights)
+        return Tractions(traction, stiffness.reshape(-1, self._dim, self._dim), self.weights)
 
     # -- configurations -------------------------------------------------------------------------------------------
 
-    def _take(self) -> Pairs:
-        """Pairs at the present displacement, made known to the law."""
+    def partners(self) -> Pairs:
+        """Pairs at the present displacement; the law knows their jump then."""
         u = self._state.u.x.array
         same = self._seen is not None and np.array_equal(u, self._seen)
         if not self._state.mesh.comm.allreduce(same, op=MPI.LAND):
-            self._pairs = self._kinematics.pairs(self._kinematics.nodes(u))
+            self._pairs = self.kinematics.pairs(self.kinematics.nodes(u))
             self._seen = u.copy()
             self._set_jump(self._pairs)
         return self._pairs
@@ -134,26 +137,26 @@ class SurfacePass:
 
     def begin(self) -> None:
         """Start a step from the committed displacement."""
-        self._kinematics.begin(self._kinematics.nodes(self._state.u_old.x.array))
+        self.kinematics.begin(self.kinematics.nodes(self._state.u_old.x.array))
         self._seen = None
 
     def evaluate(self) -> None:
         """Trial history, and the force on the slave, of the converged trial displacement."""
-        ends = [self._kinematics.nodes(u.x.array) for u in (self._state.u_old, self._state.u)]
+        ends = [self.kinematics.nodes(u.x.array) for u in (self._state.u_old, self._state.u)]
         self.history.evaluate(lambda s: self._along(ends, s))
         if self.slip is not None:
             self.slip.evaluate()
-        pairs, tractions = self._take(), self._tractions(linearised=False)
-        local = np.einsum("n,na,nai->i", self._weights, tractions.values, pairs.slave.frames)
+        pairs, tractions = self.partners(), self._tractions(linearised=False)
+        local = np.einsum("n,na,nai->i", self.weights, tractions.values, pairs.slave.frames)
         self.force = self._state.mesh.comm.allreduce(local)
 
     def _along(self, ends: list[tuple[Array, Array]], s: float) -> dict[str, Values]:
         """Values on the way of the step, see `cutsim.interface_history.Along`."""
         (slave, master), (slave_end, master_end) = ends
-        pairs = self._kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
+        pairs = self.kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
         self._set_jump(pairs)
         values = self._values()
-        change = pairs.increment(self._kinematics.interpolate(slave_end - slave), master_end - master)
+        change = pairs.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
         power = np.einsum("nai,ni->na", pairs.slave.frames, change)
         cohesive = values.pop("cohesive").reshape(-1, self._dim)
         return values | {
@@ -174,7 +177,7 @@ class SurfacePass:
         total |= {"contact": held, "numerical": total["contact"] - held}
         for entry, value in (self.slip.energies() if self.slip is not None else {}).items():
             total[entry] += value
-        return {entry: self._weight * value for entry, value in total.items()}
+        return {entry: self.weight * value for entry, value in total.items()}
 
     def rollback(self) -> None:
         """Forget the trial step."""
@@ -185,7 +188,7 @@ class SurfacePass:
 
     def commit(self) -> None:
         """Adopt history, slide and force of the step."""
-        self._kinematics.commit(self._take())
+        self.kinematics.commit(self.partners())
         self.history.commit()
         if self.slip is not None:
             self.slip.commit()
@@ -196,11 +199,11 @@ class SurfacePass:
     @property
     def pattern(self) -> int:
         """Number of the sparsity pattern."""
-        return self._kinematics.version
+        return self.kinematics.version
 
     def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
         """Add nodal forces, as `cutsim.terms.Term.add_forces`."""
-        kinematics, pairs = self._kinematics, self._take()
+        kinematics, pairs = self.kinematics, self.partners()
         tractions = self._tractions(linearised=along is not None)
         rows = pair_forces.active(kinematics, pairs, tractions)
         forces = pair_forces.forces(kinematics, pairs, tractions, rows)
@@ -212,7 +215,7 @@ class SurfacePass:
 
     def add_tangent(self, A: PETSc.Mat) -> None:
         """Add the tangent, as `cutsim.terms.Term.add_tangent`."""
-        kinematics, pairs, tractions = self._kinematics, self._take(), self._tractions(linearised=True)
+        kinematics, pairs, tractions = self.kinematics, self.partners(), self._tractions(linearised=True)
         rows = pair_forces.active(kinematics, pairs, tractions)
         for some in np.array_split(rows, 1 + len(rows) // _CHUNK):
             starts, nodes = pair_forces.stencils(kinematics, pairs, some)
@@ -223,7 +226,7 @@ class SurfacePass:
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.terms.Term.add_pattern`."""
-        dofs = self._dofs(self._kinematics.near_nodes())
+        dofs = self._dofs(self.kinematics.near_nodes())
         for some in np.array_split(dofs, 1 + len(dofs) // _CHUNK):
             add_blocks(A, some, np.zeros((*some.shape, some.shape[1])))
 
