@@ -6,7 +6,8 @@ from cutsim.conduction import HeatBody
 from cutsim.contact import PenaltyContact
 from cutsim.contact_heat import AdiabaticTool, ContactHeat
 from cutsim.crack_friction import CrackFriction
-from cutsim.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced, piecewise_direction
+from cutsim.directions import piecewise_direction
+from cutsim.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
 from cutsim.friction import Coulomb, FrictionLaw, SmoothCoulomb
 from cutsim.heat_loads import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat_transfer import HeatTransfer
@@ -16,6 +17,7 @@ from cutsim.loads import Support, Traction
 from cutsim.materials import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
 from cutsim.mechanics import Mechanics
 from cutsim.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
+from cutsim.pair_heat import PairHeat
 from cutsim.points import Surface
 from cutsim.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 from cutsim.schemes import GeneralisedAlpha, Newmark
@@ -66,6 +68,7 @@ __all__ = [
     "NeoHookean",
     "Newmark",
     "Ogden",
+    "PairHeat",
     "Path",
     "PenaltyContact",
     "Plane",

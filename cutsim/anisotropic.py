@@ -6,7 +6,7 @@ import numpy as np
 import ufl
 
 from cutsim.checks import require
-from cutsim.fibres import Direction, frame, require_axes, require_direction, vector
+from cutsim.directions import Direction, require_axes, require_direction, stretches_in, unit
 from cutsim.kinematics import Expr
 from cutsim.materials import WithoutPlaneStress, engineering_constants
 
@@ -22,7 +22,7 @@ class TransverselyIsotropic(WithoutPlaneStress):
     tension.  Stable at small strain for the constants allowed; when compressed much along a it can lose ellipticity.
 
     Args:
-        direction: Direction a; see `cutsim.fibres`.
+        direction: Direction a; see `cutsim.directions`.
         young: Young's modulus E > 0 across a [stress].
         poisson: Poisson's ratio in the plane across a, −1 < ν < 1 [–].
         axial_young: Young's modulus E_a > 0 along a [stress].
@@ -61,7 +61,7 @@ class TransverselyIsotropic(WithoutPlaneStress):
         axial = self.axial_young * (1 - self.poisson) / self._definite
         alpha, beta = shear - self.axial_shear, 0.5 * (coupling - lame)
         gamma = (axial + lame - 2 * coupling + 2 * shear - 4 * self.axial_shear) / 8
-        a = vector(self.direction) / ufl.sqrt(ufl.dot(vector(self.direction), vector(self.direction)))
+        a = unit(self.direction)
         Ca = F.T * (F * a)
         I4, I5, log_J = ufl.dot(a, Ca) - 1, ufl.dot(Ca, Ca) - 1, ufl.ln(ufl.det(F))
         matrix = 0.5 * shear * (ufl.inner(F, F) - 3) - shear * log_J
@@ -81,7 +81,7 @@ class FungOrthotropic(WithoutPlaneStress):
         coupling: b₁₂, b₂₃, b₃₁ [–].
         shear: b₄, b₅, b₆ > 0, for the planes 12, 23 and 31 [–].
         bulk: Bulk modulus K > 0 [stress].
-        axes: Directions of the first and second axis, at right angles; see `cutsim.fibres`.
+        axes: Directions of the first and second axis, at right angles; see `cutsim.directions`.
 
     Raises:
         ValueError: A constant is outside its range, or Q is not positive definite.
@@ -125,10 +125,10 @@ class FungOrthotropic(WithoutPlaneStress):
 
     def energy(self, F: Expr) -> tuple[Expr, Expr]:
         """Strain energy per reference volume, (fully integrated part, volumetric part)."""
-        J, Q = ufl.det(F), frame(self.axes)
-        E = 0.5 * (J ** (-2 / 3) * Q * F.T * F * Q.T - ufl.Identity(3))
+        J, C = ufl.det(F), stretches_in(F, self.axes)
+        E = [[0.5 * (J ** (-2 / 3) * C[i][j] - (i == j)) for j in range(3)] for i in range(3)]
         pairs = ((0, 1), (1, 2), (2, 0))
-        exponent = sum(b * E[i, i] ** 2 for i, b in enumerate(self.normal))
-        exponent += sum(2 * b * E[i, i] * E[j, j] for b, (i, j) in zip(self.coupling, pairs, strict=True))
-        exponent += sum(4 * b * E[i, j] ** 2 for b, (i, j) in zip(self.shear, pairs, strict=True))
+        exponent = sum(b * E[i][i] ** 2 for i, b in enumerate(self.normal))
+        exponent += sum(2 * b * E[i][i] * E[j][j] for b, (i, j) in zip(self.coupling, pairs, strict=True))
+        exponent += sum(4 * b * E[i][j] ** 2 for b, (i, j) in zip(self.shear, pairs, strict=True))
         return 0.5 * self.modulus * (ufl.exp(exponent) - 1), 0.5 * self.bulk * ufl.ln(J) ** 2

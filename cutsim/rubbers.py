@@ -11,7 +11,7 @@ import ufl
 from cutsim.checks import require
 from cutsim.kinematics import Expr, right_cauchy_green
 from cutsim.materials import WithoutPlaneStress, engineering_constants, isochoric_invariant
-from cutsim.stretches import stretch_power_sum
+from cutsim.stretches import stretch_power_sums
 
 
 class _NearlyIncompressible(WithoutPlaneStress):
@@ -207,9 +207,9 @@ class Ogden(WithoutPlaneStress):
 
     def energy(self, F: Expr) -> tuple[Expr, Expr]:
         """Strain energy per reference volume, (fully integrated part, volumetric part)."""
-        J = ufl.det(F)
+        J, sums = ufl.det(F), stretch_power_sums(F, self.exponents)
         terms = [
-            modulus / m**2 * (stretch_power_sum(F, m) - 3 - m * ufl.ln(J))
-            for modulus, m in zip(self.moduli, self.exponents, strict=True)
+            modulus / m**2 * (power_sum - 3 - m * ufl.ln(J))
+            for modulus, m, power_sum in zip(self.moduli, self.exponents, sums, strict=True)
         ]
         return sum(terms), 0.5 * self.volumetric * (J - 1) ** 2

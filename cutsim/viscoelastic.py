@@ -1,6 +1,7 @@
 """Quasi-linear viscoelasticity: overstresses of a Prony series at the integration points of a body (docs/materials.md).
 
-The second Piola–Kirchhoff stress S of the fully integrated part of a strain energy relaxes, the volumetric one does not:
+The second Piola–Kirchhoff stress S of the fully integrated part of a strain energy relaxes, that of the volumetric part
+does not:
 
     S_total(t) = S(t) + Σ hᵢ(t),    hᵢ(t) = ∫ gᵢ exp(−(t−s)/τᵢ) dS(s),
 
@@ -33,8 +34,8 @@ Array = NDArray[np.float64]
 class Prony:
     """Relaxation function 1 + Σ gᵢ exp(−t/τᵢ), relative to the relaxed stress.
 
-    A series 1 − Σ g'ᵢ (1 − exp(−t/τᵢ)) relative to the instantaneous stress has gᵢ = g'ᵢ/(1 − Σ g'ᵢ), with a material whose
-    moduli are 1 − Σ g'ᵢ times the instantaneous ones.
+    A series 1 − Σ g'ᵢ (1 − exp(−t/τᵢ)) relative to the instantaneous stress has gᵢ = g'ᵢ/(1 − Σ g'ᵢ), with moduli of
+    the material 1 − Σ g'ᵢ times the instantaneous ones.
 
     Args:
         strengths: gᵢ > 0, one for each term [–].
@@ -97,9 +98,11 @@ class Overstress:
         self._known, self._total, self._total_old = (fem.Function(space) for _ in range(3))
         self._weight = fem.Constant(mesh, default_scalar_type(0.0))
         self._before: tuple[float, Array] = (0.0, self._known.x.array.copy())
-        self._S = self._S_old = self._evaluate_stress()
-        self._h = self._h_old = np.zeros((len(prony.times), *self._S.shape))
-        self._decay, self._gain = np.ones(len(prony.times)), np.zeros(len(prony.times))
+        self._S: Array = self._evaluate_stress()
+        self._h: Array = np.zeros((len(prony.times), *self._S.shape))
+        self._S_old, self._h_old = self._S, self._h
+        self._decay: Array = np.ones(len(prony.times))
+        self._gain: Array = np.zeros(len(prony.times))
         self._work_form = form(self._work_of_step())
         self._work = self._work_old = 0.0
 

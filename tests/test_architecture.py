@@ -11,7 +11,7 @@ SOURCES = Path(cutsim.__file__).parent
 # a module imports from its own layer and those before it
 LAYERS = [
     {"checks", "kinematics", "measures", "compat", "assembly", "options", "parameters", "sizes", "units"},
-    {"materials", "stretches", "rubbers", "fibres", "anisotropic", "library"},
+    {"materials", "stretches", "rubbers", "directions", "fibres", "anisotropic", "library"},
     {"cohesive", "contact", "friction", "tools", "schemes", "thermoelastic", "meshing", "space"},
     {"state", "terms", "points", "viscoelastic", "slip", "temperature", "preconditioners", "tangent", "pairing"},
     {"heat_balance", "contact_heat", "heat_exchange"},
@@ -19,6 +19,7 @@ LAYERS = [
     {"pair_forces", "surface_pass", "surface_pair"},
     {"interface", "solid", "loads", "solver"},
     {"tool_contact", "inertia", "crack_friction", "energy", "conduction", "heat_loads", "interface_heat"},
+    {"heat_pass", "pair_heat"},
     {"mechanics", "tool_heat", "heat_transfer"},
     {"stepping", "staggered", "fracture"},
 ]
