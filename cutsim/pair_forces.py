@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cutsim.pair_kinematics import PairKinematics, Pairs
+from cutsim.pair_kinematics import PairKinematics
+from cutsim.pair_points import Pairs
 from cutsim.pairing import Array, Indices
 
 

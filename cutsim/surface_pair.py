@@ -12,10 +12,11 @@ from cutsim.friction import FrictionLaw
 from cutsim.kinematics import Expr
 from cutsim.outer_surface import OuterSurface, SharedSurface
 from cutsim.pair_kinematics import PairKinematics
+from cutsim.pair_law import PairLaws
 from cutsim.points import FacetPoints
 from cutsim.sizes import facet_size, normal_size
 from cutsim.state import State
-from cutsim.surface_pass import PairLaws, SurfacePass
+from cutsim.surface_pass import SurfacePass
 from cutsim.terms import Term
 
 _AXES = "xyz"
@@ -37,6 +38,8 @@ class SurfacePair(Term):
         friction: Friction law, None for none; without a tangential penalty of its own it takes that of the contact.
         fixed: Whether each point keeps its partner of the reference configuration: for bonds, and for small slides.
             Otherwise partners are found in the current configuration.
+        penetration: If given, Uzawa augmentation until no facet penetrates more than this, in the mean [length].
+        stick: If given, augmentation until no sticking facet slides more than this in a step, in the mean [length].
         two_pass: Whether each surface is slave once.
         search: Largest distance of a partner, on either side [length]; by default the mean size of the slave facets.
         name: Name in messages and output.
@@ -64,13 +67,16 @@ class SurfacePair(Term):
         young: float,
         contact: PenaltyContact | None = None,
         friction: FrictionLaw | None = None,
+        penetration: float | None = None,
+        stick: float | None = None,
         fixed: bool = False,
         two_pass: bool = False,
         search: float | None = None,
         name: str = "pair",
     ) -> None:
         require("young", young, young > 0, "> 0")
-        require("search", search, search is None or search > 0, "> 0 or None")
+        for parameter, value in {"penetration": penetration, "stick": stick, "search": search}.items():
+            require(parameter, value, value is None or value > 0, "> 0 or None")
         require("fixed", fixed, fixed or law is None, "True with a cohesive law")
         shared = state.mesh.comm.allreduce(len(np.intersect1d(slave_facets, master_facets)))
         require("slave_facets", shared, shared == 0, "no facet of master_facets")
@@ -82,7 +88,7 @@ class SurfacePair(Term):
         sizes = [p.mean(facet_size(state.mesh, p.facets)) for p in points]
         self.normal_size = points[0].mean(normal_size(state.mesh, points[0].facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
-        laws = PairLaws(law, self.contact, friction)
+        laws = PairLaws(law, self.contact, friction, penetration, stick)
         surfaces = [OuterSurface(state.V, p.facets) for p in points]
         self.entities = np.concatenate([np.column_stack([s.cells, s.local])[s.owned].ravel() for s in surfaces])
         masters = [SharedSurface(s) for s in surfaces]
@@ -131,6 +137,11 @@ class SurfacePair(Term):
         """The slide of the step counts from the committed displacement."""
         for p in self.passes:
             p.begin()
+
+    def augment(self) -> bool:
+        """Uzawa step where a facet penetrates, or slides while it sticks, by more than is allowed. Collective."""
+        # every pass takes part: a list, because any() would stop at the first
+        return any([p.augment() for p in self.passes])
 
     def evaluate(self) -> None:
         """Trial history, forces and work of the step. Collective."""

@@ -1,45 +1,23 @@
-"""One surface against another: the law at the points of the first, with its memory (docs/theory.md §3.5)."""
-
-from dataclasses import dataclass
+"""One surface against another: jump, law and forces of a step (docs/theory.md §3.5)."""
 
 import numpy as np
-import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim import pair_forces
 from cutsim.assembly import add_blocks
-from cutsim.cohesive import CohesiveLaw
-from cutsim.contact import PenaltyContact
-from cutsim.friction import FrictionLaw
 from cutsim.interface_history import GAUSS, TRAPEZOID, InterfaceHistory
-from cutsim.interface_law import respond
 from cutsim.pair_forces import Tractions
-from cutsim.pair_kinematics import PairKinematics, Pairs
+from cutsim.pair_kinematics import PairKinematics
+from cutsim.pair_law import PairLaw, PairLaws
+from cutsim.pair_points import Pairs
 from cutsim.pairing import Array
-from cutsim.parameters import with_constants
 from cutsim.points import FacetPoints, Values
-from cutsim.slip import SlipHistory, completed
 from cutsim.state import State
 
 # points whose tangents are held in memory at a time
 _CHUNK = 10_000
-
-
-@dataclass(frozen=True)
-class PairLaws:
-    """The laws of a pair, which are those of a crack.
-
-    Args:
-        cohesive: Cohesive law, None for a broken interface.
-        contact: Contact law.
-        friction: Friction law, None for none; it acts on the broken fraction.
-    """
-
-    cohesive: CohesiveLaw | None
-    contact: PenaltyContact
-    friction: FrictionLaw | None
 
 
 class SurfacePass:
@@ -72,50 +50,18 @@ class SurfacePass:
         self._dim = state.mesh.geometry.dim
         own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
         self.weights = weight * own.ravel()
-        self._jump = points.function(self._dim)
         self.history = InterfaceHistory(points, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
-        self.slip: SlipHistory | None = None
+        self._law = PairLaw(state, points, laws, self.history)
+        self.slip = self._law.slip
         self._seen: Array | None = None
-        self.partners()
-        self._write(laws)
         self.force = self._force_old = np.zeros(self._dim)
-
-    # -- law ------------------------------------------------------------------------------------------------------
-
-    def _write(self, laws: PairLaws) -> None:
-        """The laws as expressions of the jump."""
-        mesh, at = self._state.mesh, self.points.at
-        cohesive = None if laws.cohesive is None else with_constants(mesh, laws.cohesive)
-        contact = with_constants(mesh, laws.contact)
-        jump = ufl.variable(at(self._jump))
-        slide = ufl.as_vector([jump[i] for i in range(1, self._dim)])
-        r = respond(cohesive, contact, jump[0], slide, at(self.history.kappa))
-        shear = [r.shear[i] for i in range(self._dim - 1)]
-        columns = {
-            "demand": r.demand,
-            "cohesive": ufl.as_vector([r.tension, *shear]),
-            "damage": r.damage[0],
-            "sliding": r.sliding,
-            "pressure": r.pressure,
-            "held": contact.energy(-jump[0]),
-        }
-        if laws.friction is not None:
-            friction = completed(laws.friction, laws.contact.stiffness)
-            self.slip = SlipHistory(self._state, self.points, friction, slide, r.pressure, share=r.damage[1])
-            shear = [s + r.damage[1] * t for s, t in zip(shear, self.slip.traction, strict=True)]
-        traction = ufl.as_vector([r.tension - r.pressure, *shear])
-        stiffness = ufl.diff(traction, jump)
-        flat = [stiffness[i, j] for i in range(self._dim) for j in range(self._dim)]
-        self._values = self.points.evaluator(columns)
-        self._traction = self.points.evaluator({"traction": traction})
-        self._linear = self.points.evaluator({"traction": traction, "stiffness": ufl.as_vector(flat)})
 
     def _tractions(self, *, linearised: bool) -> Tractions:
         """Tractions for the jump that was found last."""
-        values = self._linear() if linearised else self._traction()
-        traction = values["traction"].reshape(-1, self._dim)
-        stiffness = values["stiffness"] if linearised else np.zeros((len(traction), self._dim, self._dim))
-        return Tractions(traction, stiffness.reshape(-1, self._dim, self._dim), self.weights)
+        if linearised:
+            return Tractions(*self._law.linear(), self.weights)
+        values = self._law.traction()
+        return Tractions(values, np.zeros((*values.shape, self._dim)), self.weights)
 
     # -- configurations -------------------------------------------------------------------------------------------
 
@@ -126,11 +72,8 @@ class SurfacePass:
         if not self._state.mesh.comm.allreduce(same, op=MPI.LAND):
             self._pairs = self.kinematics.pairs(self.kinematics.nodes(u))
             self._seen = u.copy()
-            self._set_jump(self._pairs)
+            self._law.set_jump(self._pairs.jump)
         return self._pairs
-
-    def _set_jump(self, pairs: Pairs) -> None:
-        self.points.set(self._jump, pairs.jump.reshape(*self.points.weights.shape, self._dim))
 
     def _shaped(self, values: Array) -> Values:
         return values.reshape(self.points.weights.shape)
@@ -154,8 +97,8 @@ class SurfacePass:
         """Values on the way of the step, see `cutsim.interface_history.Along`."""
         (slave, master), (slave_end, master_end) = ends
         pairs = self.kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
-        self._set_jump(pairs)
-        values = self._values()
+        self._law.set_jump(pairs.jump)
+        values = self._law.values()
         change = pairs.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
         power = np.einsum("nai,ni->na", pairs.slave.frames, change)
         cohesive = values.pop("cohesive").reshape(-1, self._dim)
@@ -165,6 +108,11 @@ class SurfacePass:
             "stored": 0.5 * self._shaped(np.einsum("na,na->n", cohesive, pairs.jump)),
             "opening": self._shaped(pairs.jump[:, 0]),
         }
+
+    def augment(self) -> bool:
+        """Improve multiplier and anchor; True if the step has to be solved again."""
+        self.partners()
+        return self._law.augment()
 
     def energies(self) -> dict[str, float]:
         """Energies of the pass, by entry of the audit.

@@ -211,6 +211,21 @@ def test_patch(gdim, simplices, degree, two_pass, tolerance):
     assert error < tolerance
 
 
+@pytest.mark.mpi
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_augmentation(gdim):
+    """A penetration of 1e-4 of the mesh size is met, and the stress is that without any penalty."""
+    b = two(gdim, n=(4, 5))
+    h = 0.5
+    pair = b.pair(penetration=1e-5 * h, two_pass=True)
+    mechanics = pressed(b, pair)
+    mechanics.begin(1.0)
+    assert mechanics.solve("basic").converged
+    mechanics.evaluate()
+    assert pair.penetration() < 1e-4
+    np.testing.assert_allclose(b.state.mesh.comm.allreduce(stresses(b).min(), MPI.MIN), -E * 0.005, rtol=5e-3)
+
+
 # -- sliding ----------------------------------------------------------------------------------------------------------
 
 LINE_SEARCHES = ("basic", "bt")
@@ -343,6 +358,8 @@ def test_rollback():
 BAD = {
     "young": {"young": 0.0},
     "search": {"search": -1.0},
+    "penetration": {"penetration": 0.0},
+    "stick": {"stick": -1.0},
     "fixed": {"law": EXPONENTIAL},
 }
 
