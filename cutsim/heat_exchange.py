@@ -1,7 +1,7 @@
 """Heat exchange between two surfaces at their integration points: fluxes, interface temperature, entropy."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from dolfinx.mesh import Mesh
@@ -30,15 +30,23 @@ class HeatExchange:
         plus: Temperature of the '+' surface, as it enters a form over the points.
         minus: Temperature of the '−' surface.
         name: Name in messages.
+        weight: Part of the area that takes part: heat, flows and entropy are multiplied by it.
 
     Attributes:
         fluxes: q⁺ and q⁻ out of the surfaces, for forms [power/area].
     """
 
     def __init__(
-        self, temperature: Temperature, points: FacetPoints, law: HeatLaw, plus: Expr, minus: Expr, name: str
+        self,
+        temperature: Temperature,
+        points: FacetPoints,
+        law: HeatLaw,
+        plus: Expr,
+        minus: Expr,
+        name: str,
+        weight: float = 1.0,
     ) -> None:
-        self.points, self.law, self.name = points, law, name
+        self.points, self.law, self.name, self._weight = points, law, name, weight
         self._zero, self._dt = temperature.absolute_zero, temperature.state.dt
         self._pressure, self._source, self._contact = (points.function() for _ in range(3))
         pressure, source, contact = (points.at(f) for f in (self._pressure, self._source, self._contact))
@@ -88,7 +96,7 @@ class HeatExchange:
         kept = flux_plus + flux_minus + self.points.get(self._source)
         entropy = kept / (values["temperature"] - zero)
         entropy -= flux_plus / (values["temperature_plus"] - zero) + flux_minus / (values["temperature_minus"] - zero)
-        self._entropy = self._entropy_old + float(self._dt.value) * self.points.integral(entropy)
+        self._entropy = self._entropy_old + float(self._dt.value) * self._integral(entropy)
         self.values = values
         least, most = self.least_dissipation(), self.points.maximum(np.abs(values["dissipation"]))
         if least < -_ROUNDING * most:
@@ -107,14 +115,17 @@ class HeatExchange:
         """Heat generated, and stored by the interface, in the trial step [energy]. Collective."""
         rise = self.values["temperature"] - self.points.get(self._contact)
         return {
-            "friction": self.points.integral(self._friction),
-            "fracture": self.points.integral(self._fracture),
-            "stored": self.law.capacity * self.points.integral(rise) if self.law.capacity else 0.0,
+            "friction": self._integral(self._friction),
+            "fracture": self._integral(self._fracture),
+            "stored": self.law.capacity * self._integral(rise) if self.law.capacity else 0.0,
         }
 
     def flow(self, side: str) -> float:
         """Heat flow out of a surface, side "plus" or "minus" [power]. Collective."""
-        return self.points.integral(self.values[f"flux_{side}"])
+        return self._integral(self.values[f"flux_{side}"])
+
+    def _integral(self, values: Values) -> float:
+        return self._weight * self.points.integral(values)
 
     def least_dissipation(self) -> float:
         """Least contact dissipation at a point in the trial step [power/area]. Collective."""
@@ -146,3 +157,19 @@ class HeatExchange:
         """Adopt interface temperature and entropy."""
         self.points.set(self._contact, self.values["temperature"])
         self._values_old, self._entropy_old = self.values, self._entropy
+
+
+def contact_columns(name: str, exchanges: Sequence[HeatExchange]) -> dict[str, tuple[float, str]]:
+    """Columns of the history for the contact of two surfaces, see `cutsim.terms.Term.record`. Collective.
+
+    Args:
+        name: Name in the columns.
+        exchanges: All exchanges between the surfaces.
+    """
+    hottest = max(e.points.maximum(e.values["temperature"]) for e in exchanges)
+    least = min(e.least_dissipation() for e in exchanges)
+    return {
+        f"{name}_temperature_max": (hottest, "temperature"),
+        f"{name}_contact_dissipation_min": (least, "flux"),
+        f"{name}_entropy": (sum(e.entropy for e in exchanges), "entropy"),
+    }

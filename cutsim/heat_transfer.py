@@ -66,6 +66,7 @@ class HeatTransfer:
             bcs=[p.bc for p in prescribed],
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
             symmetric=all(t.symmetric for t in terms),
+            terms=[t for t in terms if t.assembles],
             inertia=True,  # heat capacity is: prescribed temperatures may take no heat
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cutsim.checks import require
 from cutsim.contact_heat import ContactHeat
 from cutsim.heat_balance import HeatTerm
-from cutsim.heat_exchange import HeatExchange
+from cutsim.heat_exchange import HeatExchange, contact_columns
 from cutsim.interface import Crack
 from cutsim.kinematics import Expr
 from cutsim.points import Values
@@ -91,15 +91,11 @@ class InterfaceHeat(HeatTerm):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Heat flow out of '+' and '−', highest interface temperature, contact dissipation, entropy. Collective."""
-        exchange = self.exchange
-        hottest = exchange.points.maximum(exchange.values["temperature"])
-        return {
-            f"{self.name}_heat_flow_plus": (exchange.flow("plus"), "power"),
-            f"{self.name}_heat_flow_minus": (exchange.flow("minus"), "power"),
-            f"{self.name}_temperature_max": (hottest, "temperature"),
-            f"{self.name}_contact_dissipation_min": (exchange.least_dissipation(), "flux"),
-            f"{self.name}_entropy": (exchange.entropy, "entropy"),
+        flows = {
+            f"{self.name}_heat_flow_plus": (self.exchange.flow("plus"), "power"),
+            f"{self.name}_heat_flow_minus": (self.exchange.flow("minus"), "power"),
         }
+        return flows | contact_columns(self.name, [self.exchange])
 
     def rollback(self) -> None:
         """Forget the trial step."""

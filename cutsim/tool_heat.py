@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cutsim.checks import require
 from cutsim.contact_heat import AdiabaticTool, ContactHeat
 from cutsim.heat_balance import HeatTerm
-from cutsim.heat_exchange import HeatExchange
+from cutsim.heat_exchange import HeatExchange, contact_columns
 from cutsim.kinematics import Expr
 from cutsim.parameters import History, Schedule
 from cutsim.temperature import Temperature
@@ -103,14 +103,8 @@ class ToolHeat(HeatTerm):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Heat flow into the tool, highest temperature, contact dissipation and entropy at the contact. Collective."""
-        hottest = max(e.points.maximum(e.values["temperature"]) for e in self.exchanges)
-        least = min(e.least_dissipation() for e in self.exchanges)
-        return {
-            f"{self.name}_heat_flow": (self.heat_flow(), "power"),
-            f"{self.name}_temperature_max": (hottest, "temperature"),
-            f"{self.name}_contact_dissipation_min": (least, "flux"),
-            f"{self.name}_entropy": (sum(e.entropy for e in self.exchanges), "entropy"),
-        }
+        flow = {f"{self.name}_heat_flow": (self.heat_flow(), "power")}
+        return flow | contact_columns(self.name, self.exchanges)
 
     def rollback(self) -> None:
         """Forget the trial step."""
