@@ -6,7 +6,7 @@ do not lock.  P = ∂W/∂F and the tangent are derived by UFL.
 """
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 import ufl
 
@@ -76,7 +76,7 @@ class _Isotropic:
         require("poisson", self.poisson, -1 < self.poisson < 0.5, "in (-1, 0.5)")
 
     @classmethod
-    def from_moduli(cls, shear: float, bulk: float) -> "_Isotropic":
+    def from_moduli(cls, shear: float, bulk: float) -> Self:
         """Make the material from shear modulus G > 0 and bulk modulus K > 0 [stress]."""
         require("shear", shear, shear > 0, "> 0")
         require("bulk", bulk, bulk > 0, "> 0")

@@ -83,8 +83,8 @@ class MooneyRivlin(_NearlyIncompressible):
 class Yeoh(_NearlyIncompressible):
     """Nearly incompressible Yeoh solid, W = Σ Cᵢ (Ī₁−3)ⁱ + K/2 (ln J)², i = 1, 2, 3 (thesis 2.10).
 
-    Its stress grows with any strain as long as C₁ + 2 C₂ x + 3 C₃ x² > 0 for x = Ī₁ − 3 ≥ 0: always if C₂ ≥ 0, else if
-    C₂² < 3 C₁ C₃ (then C₂ < 0 softens before C₃ stiffens).
+    Shear never meets a stress of the wrong sign as long as C₁ + 2 C₂ x + 3 C₃ x² > 0 for x = Ī₁ − 3 ≥ 0: always if
+    C₂ ≥ 0, else if C₂² < 3 C₁ C₃ (then C₂ < 0 softens before C₃ stiffens).  Polyconvex for C₂ ≥ 0 and J < e.
 
     Args:
         c1: First constant C₁ > 0 [stress].
@@ -127,7 +127,7 @@ class ArrudaBoyce(_NearlyIncompressible):
     """Nearly incompressible eight-chain solid of Arruda and Boyce (1993), five terms (thesis 2.11).
 
     W = C [½(Ī₁−3) + (Ī₁²−9)/(20 N) + 11 (Ī₁³−27)/(1050 N²) + 19 (Ī₁⁴−81)/(7000 N³) + 519 (Ī₁⁵−243)/(673750 N⁴)]
-    + K/2 (ln J)².  Polyconvex for J < e.  The series stands for the locking energy up to a stretch of about 0.8 √N.
+    + K/2 (ln J)².  Polyconvex for J < e.
 
     Args:
         modulus: Rubbery modulus C > 0 [stress].

@@ -67,6 +67,11 @@ def test_dynamics():
     np.testing.assert_allclose(momenta, [momenta[0]] * len(momenta), atol=1e-7 * np.linalg.norm(momenta[0]))
 
 
+def test_materials():
+    gel = run_page("materials")["gel"]
+    assert gel.energies() == {"strain": 0.0, "viscous": 0.0, "thermoelastic": 0.0}
+
+
 def test_heat():
     rows = run_page("heat")["rows"]
     last = {name: value for name, (value, _) in rows[-1].items()}
