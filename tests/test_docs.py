@@ -67,7 +67,7 @@ def test_dynamics():
     np.testing.assert_allclose(momenta, [momenta[0]] * len(momenta), atol=1e-7 * np.linalg.norm(momenta[0]))
 
 
-def test_materials():
+def test_page_on_materials():
     gel = run_page("materials")["gel"]
     assert gel.energies() == {"strain": 0.0, "viscous": 0.0, "thermoelastic": 0.0}
 
