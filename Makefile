@@ -32,7 +32,7 @@ test-mpi: $(STAMP) ## run the tests marked mpi on 2 and 3 ranks
 	done
 
 bench: $(STAMP) ## print wall time, iterations and peak memory of the reference problems
-	for name in cube dcb blade; do echo "== $$name"; \
+	for name in cube dcb blade sliding; do echo "== $$name"; \
 	    scripts/run -n $(or $(RANKS),1) tests/benchmarks/bench_$$name.py || exit 1; \
 	done
 
