@@ -12,6 +12,8 @@ from cutsim.points import DEGREE
 MARGIN = 0.25
 #: Gap that is taken for none, as a fraction of that size.
 TOUCH = 1e-12
+#: Multiple of the margin beyond which, or if not finite, a displacement is no state to look for partners in.
+WILD = 1e9
 
 
 class PairKinematics:
@@ -80,6 +82,7 @@ class PairKinematics:
         """Keep the slide at the end of a step."""
         self._slid = pairs.jump[:, 1:]
 
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
         """Points and partners for nodes of slave and master facets."""
         points = self._points(nodes[0])
@@ -137,8 +140,9 @@ class PairKinematics:
 
     def _moved(self, nodes: tuple[Array, Array]) -> bool:
         """Whether the surfaces may have come nearer than the margin since they were last searched."""
-        moves = [np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, self._seen, strict=True)]
-        return bool(self.slave.maximum(moves[0]) + moves[1] > self._margin)
+        slave, master = (np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, self._seen, strict=True))
+        total = self.slave.maximum(float(np.nan_to_num(slave + master, nan=np.inf)))
+        return self._margin < total < WILD * self._margin
 
     def _look_around(self, points: Points, nodes: tuple[Array, Array]) -> None:
         """Find the facets that are near each other."""

@@ -176,6 +176,34 @@ def test_tangent(gdim, simplices, degree, case, fixed):
     assert np.abs(f.reshape(-1, gdim).sum(axis=0)).max() < 1e-13 * np.abs(f).sum()
 
 
+@pytest.mark.parametrize("offset", [-2e-3, 2e-3])
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_tangent_beside_an_edge(gdim, offset):
+    """The middle point of a facet is just left or right of an edge of the master."""
+    b = two(gdim, n=(2, 3), overhang=0.5, comm=MPI.COMM_SELF)
+    pair = b.pair(friction=Coulomb(0.4, 1e3), contact=PenaltyContact(20.0), search=0.5)
+    pair.begin(1.0)
+    shift = np.zeros(3)
+    shift[0], shift[gdim - 1] = offset, -0.05
+    b.move(lambda x: shift[:, None] + 0 * x, 1)
+    u, w = b.state.u.x.array + wavy(b.state.V, 1, 0.01), wavy(b.state.V, 3, 1e-3)
+    problem = Assembled(pair, b.state)
+    f, slope = problem.forces(u), problem.matrix(u) @ w
+    xi = pair.passes[0].partners().hits.xi
+    assert 0 < min(xi.min(), (1 - xi).min()) < 5e-3
+    remainders = np.array([np.linalg.norm(problem.forces(u + h * w) - f - h * slope) for h in 10 * STEPS])
+    assert slopes(STEPS, remainders).min() > 1.95, remainders
+
+
+def test_displacement_that_is_not_finite():
+    """What Newton's method may try is no reason to stop."""
+    b = two(3, comm=MPI.COMM_SELF)
+    pair = b.pair(friction=Coulomb(0.3))
+    for value in (np.nan, np.inf, 1e200):
+        forces = Assembled(pair, b.state).forces(np.full_like(b.state.u.x.array, value))
+        assert not np.isfinite(forces).all() or not forces.any()
+
+
 # -- patch test -------------------------------------------------------------------------------------------------------
 
 
@@ -332,27 +360,43 @@ def test_bond_between_meshes_that_do_not_match(gdim):
 
 
 def test_rollback():
-    """A step that is given up leaves no trace: the next one goes bit for bit as if it had not been."""
+    """A step that is given up leaves no trace, bit for bit, and the next one ends where it would have without."""
     ends = []
     for disturbed in (False, True):
         b = two(2, overhang=0.5)
-        pair = b.pair(friction=Coulomb(0.3))
+        pair = b.pair(friction=Coulomb(0.3), penetration=1e-3, stick=1e-3, two_pass=True)
         path = [lambda t: 0.1 * t, lambda t: -0.02 * min(t, 1)]
         supports = b.drive(0, 0, [0.0, 0.0]) + b.drive(1, 1, path)
         mechanics = Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), pair], supports)
         for end in (1.0, 1.5):
             if disturbed:
-                mechanics.begin(end + 0.05)
-                assert mechanics.solve("basic").converged
-                mechanics.evaluate()
+                before = memory(mechanics, pair)
+                step(mechanics, end + 0.05)
                 mechanics.rollback()
-            mechanics.begin(end)
-            assert mechanics.solve("basic").converged
-            mechanics.evaluate()
+                for one, other in zip(before, memory(mechanics, pair), strict=True):
+                    np.testing.assert_array_equal(one, other)
+            step(mechanics, end)
             mechanics.commit()
         ends.append([b.state.u.x.array, pair.force(), *mechanics.audit.entries.values()])
     for one, other in zip(*ends, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+
+
+def step(mechanics, end):
+    """Solve a step and evaluate it."""
+    mechanics.begin(end)
+    assert mechanics.solve("basic").converged
+    mechanics.evaluate()
+
+
+def memory(mechanics, pair):
+    """Copies of all that a step changes."""
+    arrays = [mechanics.state.u.x.array, pair.force(), list(pair.energies().values())]
+    for p in pair.passes:
+        arrays += [p.history.kappa.x.array, p.history.multiplier.x.array, *p.history.trial.values()]
+        arrays += [p.slip.values(name) for name in ("slip", "traction", "dissipated")]
+        arrays.append(p.kinematics._slid)
+    return [np.array(a) for a in arrays]
 
 
 BAD = {
