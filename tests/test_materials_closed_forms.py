@@ -6,7 +6,7 @@ import ufl
 from conftest import NU, E, make_blocks
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from test_materials import AXIS, F0, MOONEY, energy, name, response, rotation, stress
+from test_materials import AXIS, F0, MOONEY, cube_between_plates, energy, name, response, rotation, stress
 from test_tangents import assert_slope_two, smooth
 
 from cutsim.anisotropic import FungOrthotropic, TransverselyIsotropic
@@ -17,6 +17,7 @@ from cutsim.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres,
 from cutsim.materials import IsochoricNeoHookean, NeoHookean
 from cutsim.parameters import with_constants
 from cutsim.rubbers import ArrudaBoyce, Ogden, Yeoh
+from cutsim.stepping import StepControl, run
 from cutsim.stretches import stretch_power_sums
 
 STRETCHES = [0.5, 0.9, 1.0, 1.001, 1.4, 2.5]
@@ -385,6 +386,22 @@ def test_tangent(material, gdim):
     b.state.u.interpolate(lambda x: 0.3 * x[:gdim])
     u += b.state.u.x.array
     assert_slope_two(b.solid(material), b.state, u, 0.3)
+
+
+@pytest.mark.parametrize("stretch", [0.6, 2.0])
+def test_newton_from_the_reference_through_coinciding_stretches(stretch):
+    """A cube pulled and pressed from C = I, two stretches coinciding all the way.
+
+    The closed form of the incompressible solid is met up to G/K, the iterations are those of a neo-Hookean solid.
+    """
+    reports = {poisson: [] for poisson in (0.4995, 0.499999)}
+    for poisson, record in reports.items():
+        ogden = Ogden.from_poisson((0.5, 0.3), (1.3, -2.0), poisson)
+        run(cube_between_plates(ogden, stretch, False), 1.0, StepControl.fixed(0.1), record.append)
+        exact = sum(mu / m * (stretch ** (m - 1) - stretch ** (-m / 2 - 1)) for mu, m in ((0.5, 1.3), (0.3, -2.0)))
+        compressibility = ogden.shear / ogden.volumetric
+        assert record[-1].columns["top_force"][0] == pytest.approx(exact, rel=5 * compressibility)
+    assert max(r.outcome.iterations for r in reports[0.4995]) <= 6
 
 
 def test_other_values_need_no_other_kernel():
