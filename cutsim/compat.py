@@ -7,7 +7,7 @@ import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 import ufl
@@ -82,12 +82,16 @@ def expression(expression: Any, points: NDArray[np.float64], mesh: Mesh) -> fem.
         return fem.Expression(expression, points, jit_options=JIT_OPTIONS)
 
 
+# state of each cache directory (its time of change) in which nothing was found abandoned
+_clean: dict[Path, int] = {}
+
+
 @contextmanager
 def jit_cache(comm: MPI.Comm, directory: Path = CACHE_DIR) -> Iterator[None]:
-    """Hold the kernel cache alone while compiling, having removed what a killed process left half built.
+    """Share the kernel cache while compiling, having removed what a killed process left half built.
 
     A source file without its `.c.cached` mark makes the next compilation of the same form wait for a process
-    that is gone. Under the lock nobody else is compiling, so such a file is known to be abandoned.
+    that is gone. While nobody else is compiling, which the lock tells, such a file is known to be abandoned.
 
     Args:
         comm: Communicator of the compilation; only its rank 0 compiles, so only that rank takes the lock.
@@ -97,9 +101,20 @@ def jit_cache(comm: MPI.Comm, directory: Path = CACHE_DIR) -> Iterator[None]:
         yield
         return
     directory.mkdir(parents=True, exist_ok=True)
-    with open(directory / "lock", "w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # released when the file is closed, also when the process dies
-        for source in directory.glob("*.c"):
-            if not source.with_suffix(".c.cached").exists():
-                source.unlink(missing_ok=True)
+    with open(directory / "lock", "w") as lock:  # unlocked when the file is closed, also when the process dies
+        if _clean.get(directory) != directory.stat().st_mtime_ns:
+            _remove_abandoned(directory, lock)
+        fcntl.flock(lock, fcntl.LOCK_SH)
         yield
+
+
+def _remove_abandoned(directory: Path, lock: TextIO) -> None:
+    """Remove half-built kernels unless somebody is compiling."""
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return
+    for source in directory.glob("*.c"):
+        if not source.with_suffix(".c.cached").exists():
+            source.unlink(missing_ok=True)
+    _clean[directory] = directory.stat().st_mtime_ns
