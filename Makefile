@@ -4,6 +4,7 @@ SHELL := /bin/bash
 .PHONY: help setup demo test test-mpi bench lint docs clean
 
 NAME ?= blade
+JOBS ?= $(shell nproc)
 STAMP := .venv/.setup-stamp
 DOCS_STAMP := .venv/.docs-stamp
 PYTHON_IN_VENV := .venv/bin/python
@@ -22,8 +23,8 @@ demo: $(STAMP) ## run demos/demo_NAME.py: NAME=blade RANKS=2 QUICK=1 ARGS="--fri
 	    $$(ls demos | sed -n 's/^demo_\(.*\)\.py$$/\1/p') >&2; exit 2; }
 	$(RUN) demos/demo_$(NAME).py $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
 
-test: $(STAMP) ## run all tests on one rank, then those marked mpi on 2 and 3 ranks
-	scripts/run -n 1 -m pytest tests $(ARGS)
+test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those marked mpi on 2 and 3 ranks
+	scripts/run -n 1 -m pytest -n $(JOBS) --dist loadfile tests $(ARGS)
 	@$(MAKE) --no-print-directory test-mpi
 
 test-mpi: $(STAMP) ## run the tests marked mpi on 2 and 3 ranks
