@@ -108,7 +108,7 @@ class Overstress:
 
     @property
     def work(self) -> float:
-        """Work done on the overstresses so far: what they have dissipated and what they store [energy]."""
+        """Work done on the overstresses so far: what they have dissipated, and what they will give back [energy]."""
         return self._work
 
     def residual(self, v: Expr) -> ufl.Form:

@@ -128,10 +128,10 @@ class PowerSum:
         self._mesh = mesh.create_unit_interval(MPI.COMM_SELF, 1)
         self._F, self._H = (fem.Constant(self._mesh, np.eye(3)) for _ in range(2))
         self._m = fem.Constant(self._mesh, 1.0)
-        F = ufl.variable(self._F)
-        value = stretch_power_sums(F, [self._m])[0]
-        first = ufl.inner(ufl.diff(value, F), self._H)
-        second = ufl.inner(ufl.diff(first, F), self._H)
+        along = ufl.variable(fem.Constant(self._mesh, 0.0))
+        value = stretch_power_sums(self._F + along * self._H, [self._m])[0]
+        first = ufl.diff(value, along)
+        second = ufl.diff(first, along)
         self._values = expression(ufl.as_vector([value, first, second]), np.array([[0.5]]), self._mesh)
 
     def __call__(self, F, H, m):
