@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 import ufl
-from dolfinx import default_scalar_type, fem
+from dolfinx import fem
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
@@ -18,14 +18,12 @@ from cutsim.friction import FrictionLaw
 from cutsim.kinematics import Expr, tangential
 from cutsim.parameters import with_constants
 from cutsim.points import Surface, Values
+from cutsim.rigid_tool import RigidTool
 from cutsim.slip import SlipHistory, completed
 from cutsim.state import State
-from cutsim.terms import Term
 from cutsim.tools import Path, Shape
 
 logger = logging.getLogger(__name__)
-
-_AXES = "xyz"
 
 
 class Patch:
@@ -98,7 +96,7 @@ class Patch:
         return np.zeros_like(self.surface.points.weights) if self.slip is None else self.slip.dissipation()
 
 
-class ToolContact(Term):
+class ToolContact(RigidTool):
     """Contact between a moving rigid tool and some surfaces of the body.
 
     Args:
@@ -114,7 +112,6 @@ class ToolContact(Term):
 
     Attributes:
         patches: The tool on each surface.
-        position: Present position of the tool.
 
     Raises:
         ValueError: No surface is given, or the path has another dimension than the mesh.
@@ -132,22 +129,14 @@ class ToolContact(Term):
         temperature: fem.Function | None = None,
         name: str = "tool",
     ) -> None:
-        gdim = state.mesh.geometry.dim
-        start = np.asarray(path.position(0.0), dtype=float)
+        super().__init__(state, path, name)
         require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
-        require("path", start.shape, start.shape == (gdim,), f"positions of {gdim} components")
-        self.name, self.state, self.shape, self.path = name, state, shape, path
-        self.contact, self.friction = contact, friction
+        self.shape, self.contact, self.friction = shape, contact, friction
         self.symmetric = friction is None
-        self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
-        self._position_old = start.copy()
         law = None if friction is None else completed(friction, contact.stiffness)
         self.patches = tuple(Patch(state, s, shape, self.position, contact, law, temperature) for s in surfaces)
-        self._slips = [p.slip for p in self.patches if p.slip is not None]
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
-        self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
-        self._forces_old: NDArray[np.float64] = self._forces
 
     @property
     def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
@@ -155,83 +144,44 @@ class ToolContact(Term):
         return {mesh: cells for p in self.patches for mesh, cells in p.surface.points.entity_maps.items()}
 
     @property
-    def corners(self) -> tuple[float, ...]:
-        """Times at which the tool's velocity jumps."""
-        return self.path.corners
-
-    @property
-    def displacement(self) -> NDArray[np.float64]:
-        """Increment of the tool's position in the step [length]."""
-        return np.asarray(self.position.value - self._position_old)
+    def slips(self) -> Sequence[SlipHistory]:
+        """Memory of friction of the surfaces."""
+        return [p.slip for p in self.patches if p.slip is not None]
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of pressure and friction on the body."""
         return sum((p.virtual_work(v) for p in self.patches), start=ufl.Form([]))
 
-    def begin(self, time: float) -> None:
-        """Move the tool to its position at the end of the step."""
-        self.position.value[:] = self.path.position(time)
-
-    def rollback(self) -> None:
-        """Move the tool back to the start of the step."""
-        self.position.value[:] = self._position_old
-        self._forces = self._forces_old
-        for slip in self._slips:
-            slip.rollback()
-
     def evaluate(self) -> None:
         """Contact forces, slip and friction work of the trial state. Collective."""
-        self._forces = nodal_forces(self._contact_form)
-        for slip in self._slips:
+        comm, gdim = self.state.mesh.comm, self.state.mesh.geometry.dim
+        forces = nodal_forces(self._contact_form)
+        nodes = len(forces) // gdim
+        arms = self.state.V.tabulate_dof_coordinates()[:nodes].copy()
+        arms[:, :gdim] += self.state.u.x.array[: nodes * gdim].reshape(-1, gdim) - self.position.value
+        self.act(resultant(comm, forces, gdim), moment(comm, forces, arms, gdim))
+        for slip in self.slips:
             slip.evaluate()
 
     def energies(self) -> dict[str, float]:
         """Energy of the contact penalties and friction work so far. Collective."""
         total = {"contact": integrate(self._energy_form), "friction": 0.0}
-        for slip in self._slips:
+        for slip in self.slips:
             for entry, value in slip.energies().items():
                 total[entry] += value
         return total
 
-    def external_work(self) -> float:
-        """Work of the tool on the body in the step: mean force times increment. Collective."""
-        return float(-self._resultant(0.5 * (self._forces + self._forces_old)) @ self.displacement)
-
-    def force(self) -> NDArray[np.float64]:
-        """Force on the tool, from the virtual work of a rigid translation [force]. Collective."""
-        return self._resultant(self._forces)
-
-    def moment(self) -> NDArray[np.float64]:
-        """Moment on the tool about its reference point, from the virtual work of a rigid rotation. Collective."""
-        V, gdim = self.state.V, self.state.mesh.geometry.dim
-        nodes = len(self._forces) // gdim
-        arms = V.tabulate_dof_coordinates()[:nodes].copy()
-        arms[:, :gdim] += self.state.u.x.array[: nodes * gdim].reshape(-1, gdim) - self.position.value
-        return moment(self.state.mesh.comm, self._forces, arms, gdim)
-
-    def record(self) -> dict[str, tuple[float, str]]:
-        """Position, force and moment of the tool. Collective."""
-        force, couple = self.force(), self.moment()
-        gdim = len(force)
-        columns = {f"{self.name}_{_AXES[i]}": (float(self.position.value[i]), "length") for i in range(gdim)}
-        columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
-        axes = _AXES if gdim == 3 else "z"
-        columns |= {f"{self.name}_moment_{a}": (float(m), "moment") for a, m in zip(axes, couple, strict=True)}
-        if self._slips:
-            sticks, slips = np.sum([slip.areas() for slip in self._slips], axis=0)
-            kind = "length" if gdim == 2 else "area"
-            columns |= {f"{self.name}_sticking": (float(sticks), kind), f"{self.name}_slipping": (float(slips), kind)}
-        return columns
+    def rollback(self) -> None:
+        """Move the tool back to the start of the step."""
+        super().rollback()
+        for slip in self.slips:
+            slip.rollback()
 
     def commit(self) -> None:
         """Adopt position, forces and slip."""
-        self._position_old[:] = self.position.value
-        self._forces_old = self._forces
-        for slip in self._slips:
+        super().commit()
+        for slip in self.slips:
             slip.commit()
-
-    def _resultant(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-        return resultant(self.state.mesh.comm, forces, self.state.mesh.geometry.dim)
 
 
 def warn_coarse(name: str, shape: Shape, facet_size: float) -> None:

@@ -18,7 +18,7 @@ LAYERS = [
     {"interface_law", "interface_history", "outer_surface", "pair_points", "pair_kinematics"},
     {"pair_law", "pair_forces", "surface_pass", "surface_pair"},
     {"interface", "solid", "loads", "solver"},
-    {"tool_contact", "inertia", "crack_friction", "energy", "conduction", "heat_loads", "interface_heat"},
+    {"rigid_tool", "tool_contact", "inertia", "crack_friction", "energy", "conduction", "heat_loads", "interface_heat"},
     {"heat_pass", "pair_heat"},
     {"mechanics", "tool_heat", "heat_transfer"},
     {"stepping", "staggered", "fracture"},
