@@ -22,6 +22,9 @@ LAYERS = [
     {"heat_pass", "pair_heat"},
     {"mechanics", "tool_heat", "heat_transfer"},
     {"stepping", "staggered", "fracture"},
+    {"measurements", "fitting", "response", "plots", "progress"},
+    {"calibration", "indentation", "inverse"},
+    {"identify"},
 ]
 
 
