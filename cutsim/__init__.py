@@ -13,7 +13,7 @@ from cutsim.heat_loads import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat_transfer import HeatTransfer
 from cutsim.interface import Crack
 from cutsim.interface_heat import InterfaceHeat
-from cutsim.loads import Support, Traction
+from cutsim.loads import Pressure, Support, Traction
 from cutsim.materials import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
 from cutsim.mechanics import Mechanics
 from cutsim.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
@@ -73,6 +73,7 @@ __all__ = [
     "PenaltyContact",
     "Plane",
     "PrescribedTemperature",
+    "Pressure",
     "Prony",
     "Reinforced",
     "SmoothCoulomb",

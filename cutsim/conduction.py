@@ -6,7 +6,6 @@ from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
-from cutsim import kinematics
 from cutsim.assembly import integrate
 from cutsim.checks import require
 from cutsim.compat import form
@@ -82,7 +81,7 @@ class HeatBody(HeatTerm):
     def residual(self, w: Expr) -> ufl.Form:
         """Heat stored minus conducted and supplied."""
         T, T_old = self.temperature.value, self.temperature.old
-        F = (self._solid or kinematics).deformation_gradient(self.state.u)
+        F = (self._solid or self.state).deformation_gradient(self.state.u)
         flow = ufl.det(F) * ufl.inner(self._conductivity * _gradient(T, F), _gradient(w, F))
         rate = self._heat_capacity * (T - T_old) / self.state.dt
         return (flow - self._source.constant * w) * self._dx + rate * w * self._dx_storage

@@ -104,7 +104,7 @@ class CrackFriction(Term):
     def record(self) -> dict[str, tuple[float, str]]:
         """Areas that stick and slip under pressure. Collective."""
         sticks, slips = self.slip.areas()
-        kind = "length" if self.crack.state.mesh.geometry.dim == 2 else "area"
+        kind = self.crack.state.facet_measure
         return {f"{self.crack.name}_sticking": (sticks, kind), f"{self.crack.name}_slipping": (slips, kind)}
 
     def rollback(self) -> None:

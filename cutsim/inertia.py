@@ -72,6 +72,9 @@ class Inertia(Term):
         for solid in solids:
             require(f"density of {solid.name}", solid.density, solid.density is not None, "> 0 in a dynamic analysis")
         require("scheme", scheme, isinstance(scheme, Scheme), "a scheme such as Newmark() or GeneralisedAlpha(0.8)")
+        # a node on the axis would have no mass
+        whole = mass == "consistent" or not state.axisymmetric
+        require("mass", mass, whole, "'consistent' in an axisymmetric problem")
         self.state, self.scheme, self.started = state, scheme, False
         rule = _quadrature(state.V.ufl_element(), mass)
         self._bodies = [

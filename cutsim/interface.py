@@ -212,7 +212,7 @@ class Crack(Term):
             f"{self.name}_penetration": (penetration / self.normal_size, "one"),
         }
         if self.law is not None:
-            kind = "length" if self.state.mesh.geometry.dim == 2 else "area"
+            kind = self.state.facet_measure
             columns[f"{self.name}_broken"] = (self.points.integral(self.history.trial["damage"]), kind)
         return columns
 

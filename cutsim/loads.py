@@ -1,4 +1,4 @@
-"""Supports and dead loads."""
+"""Supports and loads."""
 
 import numpy as np
 import ufl
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from cutsim.assembly import global_dot, nodal_forces, resultant
 from cutsim.checks import require
 from cutsim.compat import form
-from cutsim.kinematics import Expr
+from cutsim.kinematics import Expr, cofactor
 from cutsim.parameters import History, Schedule
 from cutsim.space import locate_dofs
 from cutsim.state import State
@@ -81,34 +81,13 @@ class Support:
         return float(self.state.mesh.comm.allreduce(float(residual[self.dofs].sum())))
 
 
-class Traction(Term):
-    """Dead traction on a part of the boundary.
-
-    Args:
-        state: Displacement and time.
-        facets: Local exterior facets.
-        direction: Traction at factor 1, one number a component [stress].
-        factor: Function of time that scales it.
-        name: Name in messages and output.
-        corners: Times at which the factor has a kink.
-
-    Raises:
-        ValueError: The direction has the wrong number of components.
-    """
+class _Load(Term):
+    """Load on a part of the boundary, `_density` per reference area; it follows one factor that varies in time."""
 
     def __init__(
-        self,
-        state: State,
-        facets: NDArray[np.int32],
-        direction: tuple[float, ...],
-        factor: History,
-        *,
-        name: str = "load",
-        corners: tuple[float, ...] = (),
+        self, state: State, facets: NDArray[np.int32], factor: History, name: str, corners: tuple[float, ...]
     ) -> None:
-        gdim = state.mesh.geometry.dim
-        require("direction", direction, len(direction) == gdim, f"{gdim} numbers")
-        self.name, self.state, self._direction, self._factor, self._corners = name, state, direction, factor, corners
+        self.name, self.state, self._factor, self._corners = name, state, factor, corners
         self._ds = state.measures.exterior(facets)
         self._scale = fem.Constant(state.mesh, default_scalar_type(factor(0.0)))
         self._scale_old = float(self._scale.value)
@@ -116,14 +95,18 @@ class Traction(Term):
         self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
         self._forces_old: NDArray[np.float64] = self._forces
 
+    def _density(self) -> Expr:
+        """Force per reference area at factor 1, a vector [stress]."""
+        raise NotImplementedError
+
     @property
     def corners(self) -> tuple[float, ...]:
         """Times at which the factor has a kink."""
         return self._corners
 
     def residual(self, v: Expr) -> ufl.Form:
-        """Virtual work −∫ t·v of the load."""
-        return -self._scale * ufl.dot(ufl.as_vector(self._direction), v) * self._ds
+        """Minus the virtual work of the load."""
+        return -self._scale * ufl.dot(self._density(), v) * self._ds
 
     def begin(self, time: float) -> None:
         """Set the load to its value at a time."""
@@ -150,3 +133,75 @@ class Traction(Term):
     def commit(self) -> None:
         """Adopt the load."""
         self._scale_old, self._forces_old = float(self._scale.value), self._forces
+
+
+class Traction(_Load):
+    """Dead traction on a part of the boundary.
+
+    Args:
+        state: Displacement and time.
+        facets: Local exterior facets.
+        direction: Traction at factor 1, one number a component [stress].
+        factor: Function of time that scales it.
+        name: Name in messages and output.
+        corners: Times at which the factor has a kink.
+
+    Raises:
+        ValueError: The direction has the wrong number of components.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        direction: tuple[float, ...],
+        factor: History,
+        *,
+        name: str = "load",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require("direction", direction, len(direction) == gdim, f"{gdim} numbers")
+        self._direction = direction
+        super().__init__(state, facets, factor, name, corners)
+
+    def _density(self) -> Expr:
+        return ufl.as_vector(self._direction)
+
+
+class Pressure(_Load):
+    """Pressure of a fluid on a part of the boundary: it acts along the current normal, per current area.
+
+    Nanson's formula gives the force −p cof(F) N per reference area; in plane stress the change of thickness is left
+    out.
+
+    Args:
+        state: Displacement and time.
+        facets: Local exterior facets.
+        pressure: Function of time, > 0 pushes on the body [stress].
+        name: Name in messages and output.
+        corners: Times at which the pressure has a kink.
+
+    Raises:
+        ValueError: There is no such facet.
+    """
+
+    symmetric = False
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        pressure: History,
+        *,
+        name: str = "pressure",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        super().__init__(state, facets, pressure, name, corners)
+
+    def _density(self) -> Expr:
+        gdim = self.state.mesh.geometry.dim
+        N = ufl.FacetNormal(self.state.mesh)
+        outward = ufl.as_vector([*(N[i] for i in range(gdim)), *[0] * (3 - gdim)])
+        force = cofactor(self.state.deformation_gradient(self.state.u)) * outward
+        return -ufl.as_vector([force[i] for i in range(gdim)])

@@ -2,9 +2,11 @@
 
 dolfinx compiles a sum of terms only if they share their subdomain data.  A term asks for the entities it needs and
 gets a measure with a marker of its own; '+' is the first cell of an interior-facet row, on any number of ranks.
+In an axisymmetric problem every measure, of whatever kind, weighs with the circumference 2πr.
 """
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import ufl
@@ -12,6 +14,20 @@ from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.checks import require
+from cutsim.kinematics import Expr
+
+
+class _Revolved(ufl.Measure):
+    """Measure of the ring that an entity of the meridian plane describes when it goes round the axis x₀ = 0."""
+
+    def __rmul__(self, integrand: Expr) -> ufl.Form:
+        radius = ufl.SpatialCoordinate(self.ufl_domain())[0]
+        at = radius("+") if self.integral_type() == "interior_facet" else radius
+        return super().__rmul__(2 * np.pi * at * integrand)
+
+    def reconstruct(self, *args: Any, **options: Any) -> "_Revolved":
+        m = super().reconstruct(*args, **options)
+        return _Revolved(m.integral_type(), m.ufl_domain(), m.subdomain_id(), m.metadata(), m.subdomain_data())
 
 
 class Measures:
@@ -19,10 +35,12 @@ class Measures:
 
     Args:
         mesh: The mesh; its facet–cell connectivity is created.
+        axisymmetric: Whether the mesh is a meridian plane: measures are then those of the body of revolution.
     """
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: Mesh, *, axisymmetric: bool = False) -> None:
         self.mesh = mesh
+        self._kind = _Revolved if axisymmetric else ufl.Measure
         self._tdim = mesh.topology.dim
         mesh.topology.create_connectivity(self._tdim - 1, self._tdim)
         mesh.topology.create_connectivity(self._tdim, self._tdim - 1)
@@ -59,4 +77,4 @@ class Measures:
     def _add(self, kind: str, entities: NDArray[np.integer]) -> ufl.Measure:
         marker = len(self._data[kind])
         self._data[kind].append((marker, np.asarray(entities, dtype=np.int32).ravel()))
-        return ufl.Measure(kind, domain=self.mesh, subdomain_data=self._data[kind], subdomain_id=marker)
+        return self._kind(kind, domain=self.mesh, subdomain_data=self._data[kind], subdomain_id=marker)

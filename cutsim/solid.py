@@ -71,6 +71,7 @@ class Solid(Term):
         gdim = state.mesh.geometry.dim
         require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
         require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
+        require("plane", plane, plane == "strain" or not state.axisymmetric, "'strain' in an axisymmetric problem")
         require("volumetric", volumetric, volumetric in ("auto", "full", "reduced"), "'auto', 'full' or 'reduced'")
         require("viscosity", viscosity, viscosity >= 0, ">= 0")
         require("density", density, density is None or density > 0, "> 0")
@@ -137,8 +138,8 @@ class Solid(Term):
         """Virtual work of the elastic and viscous stresses."""
         work = ufl.derivative(self._stored(self.state.u), self.state.u, v)
         if self.viscosity:
-            E = green_lagrange(deformation_gradient(self.state.u))
-            rate = (E - green_lagrange(deformation_gradient(self.state.u_old))) / self.state.dt
+            E, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
+            rate = (E - old) / self.state.dt
             work += self._viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
         if self._overstress is not None:
             work += self._overstress.residual(v)
@@ -227,7 +228,7 @@ class Solid(Term):
         return None if self.temperature is None else self.temperature.value
 
     def _deformation_gradient(self, u: Expr, T: Expr | None) -> Expr:
-        F = deformation_gradient(u)
+        F = self.state.deformation_gradient(u)
         if self.plane == "strain":
             return F
         if self._thermoelastic is None:
@@ -257,5 +258,5 @@ class Solid(Term):
         return 0.5 * total
 
     def _viscous_work(self) -> ufl.Form:
-        new, old = (green_lagrange(deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
+        new, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
         return self._viscosity / self.state.dt * ufl.inner(new - old, new - old) * self.measures[0]

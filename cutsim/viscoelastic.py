@@ -84,10 +84,11 @@ class Overstress:
     ) -> None:
         mesh, gdim = state.mesh, state.mesh.geometry.dim
         self._state, self._prony, self._energy, self._dx = state, prony, energy, measure
+        self._gradient = state.deformation_gradient
         index_map = mesh.topology.index_map(mesh.topology.dim)
         self._cells = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32) if cells is None else cells
-        # strain has no component out of the plane
-        self._pairs = [(i, j) for i in range(gdim) for j in range(i, gdim)]
+        # strain has no component out of the plane but around an axis
+        self._pairs = [(i, j) for i in range(gdim) for j in range(i, gdim)] + [(2, 2)] * state.axisymmetric
         degree, name = measure.metadata()["quadrature_degree"], mesh.topology.cell_name()
         element = basix.ufl.quadrature_element(name, value_shape=(len(self._pairs),), degree=degree)
         space = fem.functionspace(mesh, element)
@@ -115,7 +116,7 @@ class Overstress:
         """Virtual work of the overstresses."""
         u = self._state.u
         changing = ufl.derivative(self._weight * self._energy * self._dx, u, v)
-        return changing + ufl.inner(self._piola(u, self._known), ufl.grad(v)) * self._dx
+        return changing + ufl.inner(self._piola(u, self._known), ufl.derivative(self._gradient(u), u, v)) * self._dx
 
     def begin(self) -> None:
         """Factors of the step whose size the state knows."""
@@ -153,14 +154,14 @@ class Overstress:
         f.x.array.reshape(-1, len(self._pairs))[self._dofs] = values
 
     def _piola(self, u: Expr, f: fem.Function) -> Expr:
-        """First Piola–Kirchhoff stress of a symmetric second one."""
-        gdim = len(u)
+        """First Piola–Kirchhoff stress of a symmetric second one, 3 × 3."""
         order = {pair: k for k, pair in enumerate(self._pairs)}
-        H = ufl.as_matrix([[f[order[min(i, j), max(i, j)]] for j in range(gdim)] for i in range(gdim)])
-        return (ufl.Identity(gdim) + ufl.grad(u)) * H
+        places = [[order.get((min(i, j), max(i, j))) for j in range(3)] for i in range(3)]
+        H = ufl.as_matrix([[0 if k is None else f[k] for k in row] for row in places])
+        return self._gradient(u) * H
 
     def _work_of_step(self) -> ufl.Form:
         """Mean traction times increment, the rule by which the audit sums the work of the supports."""
         new, old = self._state.u, self._state.u_old
         mean = 0.5 * (self._piola(new, self._total) + self._piola(old, self._total_old))
-        return ufl.inner(mean, ufl.grad(new - old)) * self._dx
+        return ufl.inner(mean, self._gradient(new) - self._gradient(old)) * self._dx
