@@ -32,6 +32,8 @@ from cutsim.thermoelastic import ThermoElastic
 from cutsim.tool_contact import ToolContact
 from cutsim.tool_heat import ToolHeat
 from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
+from cutsim.triangulated_tool import TriangulatedTool
+from cutsim.triangulation import Triangulation
 from cutsim.viscoelastic import Prony
 
 __version__ = "0.1.0"
@@ -94,6 +96,8 @@ __all__ = [
     "ToolHeat",
     "Traction",
     "TransverselyIsotropic",
+    "TriangulatedTool",
+    "Triangulation",
     "Yeoh",
     "cracked_space",
     "piecewise_direction",

@@ -11,7 +11,7 @@ from cutsim.contact_heat import ContactHeat
 from cutsim.heat_exchange import HeatExchange
 from cutsim.outer_surface import OuterSurface, SharedSurface
 from cutsim.pairing import Array, Indices
-from cutsim.points import DEGREE, Values
+from cutsim.points import Values
 from cutsim.surface_pass import SurfacePass
 from cutsim.temperature import Temperature
 
@@ -26,6 +26,7 @@ class HeatPass:
     Args:
         temperature: The temperature.
         contact: The pass of the mechanical pair.
+        master: Local facets of its master surface, ghosts included.
         law: Law of exchange, '+' being the slave.
         name: Name in messages.
 
@@ -34,12 +35,19 @@ class HeatPass:
         exchange: What is known of heat at the points.
     """
 
-    def __init__(self, temperature: Temperature, contact: SurfacePass, law: ContactHeat, name: str) -> None:
+    def __init__(
+        self,
+        temperature: Temperature,
+        contact: SurfacePass,
+        master: NDArray[np.int32],
+        law: ContactHeat,
+        name: str,
+    ) -> None:
         self.contact, self._temperature, self._fraction = contact, temperature, law.fracture_fraction
         points, kinematics = contact.points, contact.kinematics
         self._slave = OuterSurface(temperature.space, kinematics.slave.facets)
-        self._master = SharedSurface(OuterSurface(temperature.space, kinematics.master.surface.facets))
-        places = basix.make_quadrature(self._slave.shape.element.cell_type, DEGREE)[0]
+        self._master = SharedSurface(OuterSurface(temperature.space, master))
+        places = basix.make_quadrature(self._slave.shape.element.cell_type, points.degree)[0]
         self._own_values = np.tile(self._slave.shape.values(places)[0], (len(self._slave.facets), 1))
         self._facets: Indices = np.repeat(np.arange(len(self._slave.facets)), len(places))
         self._pair()

@@ -1,5 +1,7 @@
 """The nodes of facets on the outer boundary: on the ranks that have them, or gathered on every rank."""
 
+from typing import Protocol
+
 import basix
 import numpy as np
 from dolfinx import fem
@@ -59,6 +61,26 @@ class OuterSurface:
         return float(self.V.mesh.comm.allreduce(value, op=MPI.MAX))
 
 
+class Master(Protocol):
+    """A surface that points find, of which every rank knows all facets. Every method is collective.
+
+    Attributes:
+        shape, sides, reference: As of `OuterSurface`, for the facets of all ranks.
+        global_nodes: Global nodes of each facet; −1, which PETSc passes over, for one that has no unknowns.
+    """
+
+    shape: Shape
+    sides: Array
+    reference: Array
+    global_nodes: Indices
+
+    def nodes(self, u: Array, *, start: bool) -> Array:
+        """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""
+
+    def gather(self, values: Array) -> Array:
+        """Values on the facets, shape (facets, nodes, components), of an array over the local dofs of each rank."""
+
+
 class SharedSurface:
     """An outer surface of which every rank knows all facets. Every method is collective.
 
@@ -84,6 +106,10 @@ class SharedSurface:
         first, last = V.dofmap.index_map.local_range
         self._own = numbers[(numbers >= first) & (numbers < last)] - first
         self._counts = np.array(self._comm.allgather(len(self._own) * self._components))
+
+    def nodes(self, u: Array, *, start: bool) -> Array:
+        """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""
+        return self.reference + self.gather(u)
 
     def gather(self, values: Array) -> Array:
         """Values on the facets, shape (facets, nodes, components), of an array over the local dofs of each rank."""

@@ -46,8 +46,8 @@ class PairHeat(HeatTerm):
         self.pair, self.law = pair, law
         swapped = replace(law, gamma_plus=law.gamma_minus, gamma_minus=law.gamma_plus)
         self.passes = tuple(
-            HeatPass(temperature, contact, side, self.name)
-            for contact, side in zip(pair.passes, (law, swapped), strict=False)
+            HeatPass(temperature, contact, master, side, self.name)
+            for contact, master, side in zip(pair.passes, pair.facets[::-1], (law, swapped), strict=False)
         )
 
     def residual(self, w: Expr) -> ufl.Form:

@@ -3,11 +3,13 @@
 import basix
 import numpy as np
 
-from cutsim.outer_surface import OuterSurface, SharedSurface
+from cutsim.outer_surface import Master, OuterSurface
 from cutsim.pair_points import Pairs, Points
 from cutsim.pairing import Array, Hits, Indices, near_facets, project
 from cutsim.points import DEGREE
 
+#: Degree of the quadrature on a slave surface, by that of the displacement: master facets end within a slave facet.
+DEGREES = {1: DEGREE, 2: 8}
 #: Distance both surfaces may move before partners are looked for anew, as a fraction of the mean slave facet's size.
 MARGIN = 0.25
 #: Gap that is taken for none, as a fraction of that size.
@@ -39,9 +41,10 @@ class PairKinematics:
         near: Slave and master facets that are near each other.
     """
 
-    def __init__(self, slave: OuterSurface, master: SharedSurface, *, fixed: bool, search: float, size: float) -> None:
+    def __init__(self, slave: OuterSurface, master: Master, *, fixed: bool, search: float, size: float) -> None:
         self.slave, self.master, self.fixed, self._search = slave, master, fixed, search
-        places = basix.make_quadrature(slave.shape.element.cell_type, DEGREE)[0]
+        shape = slave.shape.element
+        places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
         self.tables = slave.shape.values(places)
         self._size, self._margin = size, MARGIN * size
         self.version = 0
@@ -54,9 +57,14 @@ class PairKinematics:
         if fixed:
             self._offset = self.pairs(nodes).jump
 
-    def nodes(self, u: Array) -> tuple[Array, Array]:
-        """Current nodes of slave and master facets, from a displacement of the local dofs."""
-        return self.slave.reference + self.slave.gather(u), self.master.reference + self.master.gather(u)
+    def nodes(self, u: Array, *, start: bool = False) -> tuple[Array, Array]:
+        """Current nodes of slave and master facets, from a displacement of the local dofs.
+
+        Args:
+            u: The displacement.
+            start: Whether it is that at the start of the step.
+        """
+        return self.slave.reference + self.slave.gather(u), self.master.nodes(u, start=start)
 
     def interpolate(self, nodes: Array) -> Array:
         """Values at the points of a field on the nodes of the slave facets."""

@@ -12,6 +12,7 @@ from dolfinx.mesh import Mesh, create_submesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.checks import require
 from cutsim.compat import form
 from cutsim.kinematics import Expr
 from cutsim.state import State
@@ -33,18 +34,22 @@ class FacetPoints:
         facets: Local facets, ghosts included.
         measure: Measure over them, interior if `interior`.
         interior: Whether the facets have a cell on either side.
+        degree: Degree of the quadrature.
 
     Attributes:
+        degree: Degree of the quadrature.
         measure: The measure, with its quadrature rule.
         submesh: Mesh of the facets, on which history functions live.
         facets: Local facet of the parent mesh for each cell of the submesh.
         weights: Weights of the points in the reference configuration [length or area].
     """
 
-    def __init__(self, mesh: Mesh, facets: NDArray[np.int32], measure: ufl.Measure, *, interior: bool) -> None:
+    def __init__(
+        self, mesh: Mesh, facets: NDArray[np.int32], measure: ufl.Measure, *, interior: bool, degree: int = DEGREE
+    ) -> None:
         fdim = mesh.topology.dim - 1
-        self._interior = interior
-        self.measure = measure(metadata={"quadrature_degree": DEGREE, "quadrature_scheme": "default"})
+        self._interior, self.degree = interior, degree
+        self.measure = measure(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
         self.submesh, parents = create_submesh(mesh, fdim, np.unique(np.asarray(facets, dtype=np.int32)))[:2]
         self.facets = np.asarray(parents, dtype=np.int32)
         index_map = mesh.topology.index_map(fdim)
@@ -52,6 +57,8 @@ class FacetPoints:
         self._facet_to_cell[parents] = np.arange(len(parents), dtype=np.int32)
         self._owned = self.submesh.topology.index_map(fdim).size_local
         self.weights = self._assemble({"one": ufl.as_ufl(1.0)})()["one"]
+        smallest, largest = -self.maximum(-self.weights), self.maximum(self.weights)
+        require("facets", "on the axis of rotation", not smallest <= 1e-12 * largest, "facets that have an area")
 
     @property
     def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
@@ -116,7 +123,9 @@ class FacetPoints:
     def _space(self, components: int) -> fem.FunctionSpace:
         shape = () if components == 1 else (components,)
         cell = self.submesh.topology.cell_name()
-        return fem.functionspace(self.submesh, basix.ufl.quadrature_element(cell, value_shape=shape, degree=DEGREE))
+        return fem.functionspace(
+            self.submesh, basix.ufl.quadrature_element(cell, value_shape=shape, degree=self.degree)
+        )
 
     def _assemble(self, expressions: Mapping[str, Expr]) -> Callable[[], dict[str, Values]]:
         """Expressions times weights: one vector form for all of them."""

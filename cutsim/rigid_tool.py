@@ -39,7 +39,7 @@ class RigidTool(Term):
         self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
         self._position_old = start.copy()
         self._action: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
-        self._action_old = self._action
+        self._action_old: _Action = self._action
 
     @property
     def slips(self) -> Sequence[SlipHistory]:

@@ -13,10 +13,9 @@ from cutsim.kinematics import Expr
 from cutsim.outer_surface import OuterSurface, SharedSurface
 from cutsim.pair_kinematics import PairKinematics
 from cutsim.pair_law import PairLaws
-from cutsim.points import FacetPoints
 from cutsim.sizes import facet_size, normal_size
 from cutsim.state import State
-from cutsim.surface_pass import SurfacePass
+from cutsim.surface_pass import SurfacePass, slave_points
 from cutsim.terms import Term
 
 _AXES = "xyz"
@@ -46,6 +45,7 @@ class SurfacePair(Term):
 
     Attributes:
         passes: The slave against the master, and with two passes the other way round.
+        facets: Local facets of slave and master, ghosts included.
         entities: Rows (cell, local facet), flattened, of the facets of both surfaces on this rank.
         contact: The contact law.
         normal_size: Mean size of the cells normal to the slave surface, the h of the penalty [length].
@@ -81,15 +81,13 @@ class SurfacePair(Term):
         shared = state.mesh.comm.allreduce(len(np.intersect1d(slave_facets, master_facets)))
         require("slave_facets", shared, shared == 0, "no facet of master_facets")
         self.name, self.state, self.law = name, state, law
-        points = [
-            FacetPoints(state.mesh, facets, state.measures.exterior(facets), interior=False)
-            for facets in (slave_facets, master_facets)
-        ]
+        points = [slave_points(state, facets) for facets in (slave_facets, master_facets)]
         sizes = [p.mean(facet_size(state.mesh, p.facets)) for p in points]
         self.normal_size = points[0].mean(normal_size(state.mesh, points[0].facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         laws = PairLaws(law, self.contact, friction, penetration, stick)
         surfaces = [OuterSurface(state.V, p.facets) for p in points]
+        self.facets = tuple(p.facets for p in points)
         self.entities = np.concatenate([np.column_stack([s.cells, s.local])[s.owned].ravel() for s in surfaces])
         masters = [SharedSurface(s) for s in surfaces]
         self.passes = tuple(
@@ -175,7 +173,7 @@ class SurfacePair(Term):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Force on the slave, pressed area, penetration, areas that stick and slip, broken area. Collective."""
-        kind = "length" if self.state.mesh.geometry.dim == 2 else "area"
+        kind = self.state.facet_measure
         first, name = self.passes[0], self.name
         pressed = first.history.trial["pressure"] > 0
         columns = {f"{name}_force_{a}": (float(f), "force") for a, f in zip(_AXES, self.force(), strict=False)}

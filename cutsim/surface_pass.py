@@ -7,9 +7,10 @@ from petsc4py import PETSc
 
 from cutsim import pair_forces
 from cutsim.assembly import add_blocks
+from cutsim.checks import require
 from cutsim.interface_history import GAUSS, TRAPEZOID, InterfaceHistory
 from cutsim.pair_forces import Tractions
-from cutsim.pair_kinematics import PairKinematics
+from cutsim.pair_kinematics import DEGREES, PairKinematics
 from cutsim.pair_law import PairLaw, PairLaws
 from cutsim.pair_points import Pairs
 from cutsim.pairing import Array
@@ -18,6 +19,18 @@ from cutsim.state import State
 
 # points whose tangents are held in memory at a time
 _CHUNK = 10_000
+
+
+def slave_points(state: State, facets: NDArray[np.int32]) -> FacetPoints:
+    """The integration points of a slave surface, given by its local exterior facets, ghosts included. Collective.
+
+    Raises:
+        ValueError: The displacement is not of degree 1 or 2.
+    """
+    degree = state.V.element.basix_element.degree
+    require("degree", degree, degree in DEGREES, "1 or 2: fields on the surfaces of a pair")
+    measure = state.measures.exterior(facets)
+    return FacetPoints(state.mesh, facets, measure, interior=False, degree=DEGREES[degree])
 
 
 class SurfacePass:
@@ -80,20 +93,26 @@ class SurfacePass:
 
     def begin(self) -> None:
         """Start a step from the committed displacement."""
-        self.kinematics.begin(self.kinematics.nodes(self._state.u_old.x.array))
+        self.kinematics.begin(self._start())
         self._seen = None
 
     def evaluate(self) -> None:
         """Trial history, and the force on the slave, of the converged trial displacement."""
-        ends = [self.kinematics.nodes(u.x.array) for u in (self._state.u_old, self._state.u)]
+        ends = self._start(), self.kinematics.nodes(self._state.u.x.array)
         self.history.evaluate(lambda s: self._along(ends, s))
         if self.slip is not None:
             self.slip.evaluate()
-        pairs, tractions = self.partners(), self._tractions(linearised=False)
-        local = np.einsum("n,na,nai->i", self.weights, tractions.values, pairs.slave.frames)
-        self.force = self._state.mesh.comm.allreduce(local)
+        self.force = self._state.mesh.comm.allreduce(self.point_forces().sum(axis=0))
 
-    def _along(self, ends: list[tuple[Array, Array]], s: float) -> dict[str, Values]:
+    def point_forces(self) -> Array:
+        """Present forces on the slave at the points, shape (points, dimension); zero where another rank adds them."""
+        pairs, tractions = self.partners(), self._tractions(linearised=False)
+        return np.asarray(np.einsum("n,na,nai->ni", self.weights, tractions.values, pairs.slave.frames))
+
+    def _start(self) -> tuple[Array, Array]:
+        return self.kinematics.nodes(self._state.u_old.x.array, start=True)
+
+    def _along(self, ends: tuple[tuple[Array, Array], ...], s: float) -> dict[str, Values]:
         """Values on the way of the step, see `cutsim.interface_history.Along`."""
         (slave, master), (slave_end, master_end) = ends
         pairs = self.kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
@@ -158,7 +177,7 @@ class SurfacePass:
         if along is not None:
             change = kinematics.at_stencil(along, pairs, rows)
             forces += np.einsum("nricj,ncj->nri", pair_forces.tangents(kinematics, pairs, tractions, rows), change)
-        dofs = self._dofs(pair_forces.nodes(kinematics, pairs, rows))
+        dofs = self.dofs(pair_forces.nodes(kinematics, pairs, rows))
         b.setValues(dofs.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
 
     def add_tangent(self, A: PETSc.Mat) -> None:
@@ -169,14 +188,15 @@ class SurfacePass:
             starts, nodes = pair_forces.stencils(kinematics, pairs, some)
             if len(starts):
                 blocks = np.add.reduceat(pair_forces.tangents(kinematics, pairs, tractions, some), starts)
-                dofs = self._dofs(nodes)
+                dofs = self.dofs(nodes)
                 add_blocks(A, dofs, blocks.reshape(*dofs.shape, dofs.shape[1]))
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.terms.Term.add_pattern`."""
-        dofs = self._dofs(self.kinematics.near_nodes())
+        dofs = self.dofs(self.kinematics.near_nodes())
         for some in np.array_split(dofs, 1 + len(dofs) // _CHUNK):
             add_blocks(A, some, np.zeros((*some.shape, some.shape[1])))
 
-    def _dofs(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    def dofs(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Global dofs of global nodes, shape (…, nodes) → (…, dofs); negative for −1."""
         return (nodes[..., None] * self._dim + np.arange(self._dim)).reshape(len(nodes), self._dim * nodes.shape[1])

@@ -1,0 +1,155 @@
+"""A rigid tool whose surface is made of triangles, or of segments in 2-D (docs/theory.md §3.5, §4)."""
+
+from collections.abc import Sequence
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import fem
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.assembly import add_blocks, moment
+from cutsim.checks import require
+from cutsim.contact import PenaltyContact
+from cutsim.friction import FrictionLaw
+from cutsim.kinematics import Expr
+from cutsim.outer_surface import OuterSurface
+from cutsim.pair_kinematics import PairKinematics
+from cutsim.pair_law import PairLaws
+from cutsim.pairing import Array, Indices, Shape
+from cutsim.rigid_tool import RigidTool
+from cutsim.sizes import facet_size
+from cutsim.slip import SlipHistory
+from cutsim.state import State
+from cutsim.surface_pass import SurfacePass, slave_points
+from cutsim.tools import Path
+from cutsim.triangulation import Triangulation
+
+
+class RigidSurface:
+    """A triangulation that moves with a tool, as `cutsim.outer_surface.Master`.
+
+    Args:
+        triangulation: The surface, relative to the reference point.
+        now: Present position of the reference point; it is read whenever the surface is asked for.
+        before: Its position at the start of the step, likewise.
+    """
+
+    def __init__(self, triangulation: Triangulation, now: fem.Constant, before: Array) -> None:
+        kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[triangulation.points.shape[1]]
+        self.shape = Shape(basix.create_element(basix.ElementFamily.P, kind, 1))
+        self._corners, self._now, self._before = triangulation.corners, now, before
+        self.sides: Array = np.ones(len(self._corners))
+        self.reference: Array = self._corners + before
+        self.global_nodes: Indices = np.full(triangulation.facets.shape, -1)
+
+    def nodes(self, u: Array, *, start: bool) -> Array:
+        """Current nodes of the facets, at the start or the end of the step, whatever the displacement."""
+        return self._corners + (self._before if start else self._now.value)
+
+    def gather(self, values: Array) -> Array:
+        """Zero: the surface has no unknowns."""
+        return np.zeros_like(self._corners)
+
+
+class TriangulatedTool(RigidTool):
+    """Contact between a rigid tool of triangles and an outer surface of the body.
+
+    The points of the body find the tool along their own normals, as in a pair of surfaces: the traction turns with the
+    surface of the body and is continuous where points slide over the edges of the triangles.
+
+    Args:
+        state: Displacement, of degree 1 or 2, and time.
+        facets: Local exterior facets that the tool can touch, ghosts included.
+        surface: Surface of the tool relative to its reference point, the same on all ranks.
+        path: Motion of the reference point.
+        contact: Contact law; the pressure acts per reference area.
+        friction: Friction law, None for none; without a tangential penalty of its own it takes that of the contact law.
+        search: Largest distance of a partner, on either side [length]; by default the mean size of the facets.  The
+            tool must not come nearer by more than this in a step.
+        name: Name in messages and output.
+
+    Raises:
+        ValueError: A parameter is outside its range, or path or surface have another dimension than the mesh.
+    """
+
+    symmetric = False
+    assembles = True
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        surface: Triangulation,
+        path: Path,
+        *,
+        contact: PenaltyContact,
+        friction: FrictionLaw | None = None,
+        search: float | None = None,
+        name: str = "tool",
+    ) -> None:
+        super().__init__(state, path, name)
+        gdim = state.mesh.geometry.dim
+        require("search", search, search is None or search > 0, "> 0 or None")
+        require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
+        points = slave_points(state, facets)
+        size = points.mean(facet_size(state.mesh, points.facets))
+        master = RigidSurface(surface, self.position, self._position_old)
+        kinematics = PairKinematics(
+            OuterSurface(state.V, points.facets), master, fixed=False, search=search or size, size=size
+        )
+        laws = PairLaws(None, contact, friction, None, None)
+        self.touch = SurfacePass(state, points, kinematics, laws, weight=1.0)
+
+    @property
+    def slips(self) -> Sequence[SlipHistory]:
+        """Memory of friction of the surface."""
+        return [] if self.touch.slip is None else [self.touch.slip]
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """No form: see `add_forces`."""
+        return ufl.Form([])
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
+        """Add the virtual work −∫ T·v dΓ₀. Collective."""
+        self.touch.add_forces(b, along)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add its exact derivative. Collective."""
+        self.touch.add_tangent(A)
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros for all facets: the pattern never changes. Collective."""
+        slave = self.touch.kinematics.slave
+        dofs = self.touch.dofs(slave.global_nodes[slave.owned])
+        add_blocks(A, dofs, np.zeros((*dofs.shape, dofs.shape[1])))
+
+    def begin(self, time: float) -> None:
+        """Move the tool; the slide of the step counts from the committed displacement."""
+        super().begin(time)
+        self.touch.begin()
+
+    def evaluate(self) -> None:
+        """Trial history, force and moment of the step. Collective."""
+        self.touch.evaluate()
+        pairs, gdim = self.touch.partners(), self.state.mesh.geometry.dim
+        points = pairs.hits.points
+        arms = np.zeros((len(points), 3))
+        arms[:, :gdim] = pairs.slave.x[points] + pairs.distance - self.position.value
+        forces = -self.touch.point_forces()[points]
+        self.act(-self.touch.force, moment(self.state.mesh.comm, forces.ravel(), arms, gdim))
+
+    def energies(self) -> dict[str, float]:
+        """Energy of the contact penalty, friction work, and work of the pressure that neither holds. Collective."""
+        return self.touch.energies()
+
+    def rollback(self) -> None:
+        """Forget the trial step."""
+        super().rollback()
+        self.touch.rollback()
+
+    def commit(self) -> None:
+        """Adopt the trial step."""
+        self.touch.commit()
+        super().commit()
