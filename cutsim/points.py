@@ -13,7 +13,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.checks import require
-from cutsim.checks import require
 from cutsim.compat import form
 from cutsim.kinematics import Expr
 from cutsim.state import State
@@ -58,8 +57,6 @@ class FacetPoints:
         self._facet_to_cell[parents] = np.arange(len(parents), dtype=np.int32)
         self._owned = self.submesh.topology.index_map(fdim).size_local
         self.weights = self._assemble({"one": ufl.as_ufl(1.0)})()["one"]
-        smallest, largest = -self.maximum(-self.weights), self.maximum(self.weights)
-        require("facets", "on the axis of rotation", not smallest <= 1e-12 * largest, "facets that have an area")
         smallest, largest = -self.maximum(-self.weights), self.maximum(self.weights)
         require("facets", "on the axis of rotation", not smallest <= 1e-12 * largest, "facets that have an area")
 
