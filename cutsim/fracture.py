@@ -61,7 +61,8 @@ class JIntegral:
         length: float = 1.0,
     ) -> None:
         gdim = solid.state.mesh.geometry.dim
-        require("solid", solid.name, not solid.state.axisymmetric, "a body that is not axisymmetric")
+        plain = not (solid.state.axisymmetric or solid.assembles)
+        require("solid", solid.name, plain, "a body that is not axisymmetric, without mixed elements")
         require("tip", tip, len(tip) == gdim, f"a point of {gdim} coordinates")
         require("direction", direction, len(direction) == gdim and any(direction), f"{gdim} numbers, not all zero")
         require("inner", inner, 0 <= inner < outer, f">= 0 and < outer = {outer!r}")

@@ -9,11 +9,12 @@ import ufl
 from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
 from cutsim.assembly import integrate
 from cutsim.checks import require
 from cutsim.compat import expression, form
-from cutsim.kinematics import Expr, deformation_gradient, green_lagrange
+from cutsim.kinematics import Expr, cofactor, deformation_gradient, green_lagrange
 from cutsim.materials import Material
 from cutsim.parameters import with_constants
 from cutsim.state import State
@@ -21,6 +22,7 @@ from cutsim.temperature import Temperature
 from cutsim.terms import Term
 from cutsim.thermoelastic import ThermoElastic
 from cutsim.viscoelastic import Overstress, Prony
+from cutsim.volume_change import VolumeChange
 
 logger = logging.getLogger(__name__)
 
@@ -38,7 +40,9 @@ class Solid(Term):
         name: Name in messages and output.
         plane: For two-dimensional meshes, plane strain or plane stress (unit thickness).
         volumetric: "full" or "reduced" integration of the volumetric part; by default reduced for ν ≥ 0.45.
-            On simplices of degree 1 both coincide, and a warning says that the element locks.
+            On simplices of degree 1 both coincide, and a warning says that the element locks. "mixed" projects the
+            volume change in each quadrilateral or hexahedron (docs/elements.md); with a material whose volumetric
+            part depends on det F only, and without thermal expansion.
         viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
         relaxation: Prony series by which all but the volumetric part relaxes; the material is then the relaxed one.
             The stresses of the methods below are without overstress.
@@ -61,7 +65,7 @@ class Solid(Term):
         *,
         name: str = "body",
         plane: Literal["strain", "stress"] = "strain",
-        volumetric: Literal["auto", "full", "reduced"] = "auto",
+        volumetric: Literal["auto", "full", "reduced", "mixed"] = "auto",
         viscosity: float = 0.0,
         relaxation: Prony | None = None,
         density: float | None = None,
@@ -72,7 +76,8 @@ class Solid(Term):
         require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
         require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
         require("plane", plane, plane == "strain" or not state.axisymmetric, "'strain' in an axisymmetric problem")
-        require("volumetric", volumetric, volumetric in ("auto", "full", "reduced"), "'auto', 'full' or 'reduced'")
+        kinds = ("auto", "full", "reduced", "mixed")
+        require("volumetric", volumetric, volumetric in kinds, "'auto', 'full', 'reduced' or 'mixed'")
         require("viscosity", viscosity, viscosity >= 0, ">= 0")
         require("density", density, density is None or density > 0, "> 0")
         # there λ₃ would depend on the overstress
@@ -88,6 +93,8 @@ class Solid(Term):
         self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
         self.measures = self._choose_measures(volumetric)
+        self.assembles = volumetric == "mixed"
+        self._mixed = self._projected() if self.assembles else None
         self._overstress = None if relaxation is None else self._relaxing(relaxation)
         self._energy_form = form(self._stored(state.u))
         self._viscous_form = form(self._viscous_work()) if viscosity else None
@@ -123,6 +130,8 @@ class Solid(Term):
     def first_piola(self, u: Expr) -> Expr:
         """First Piola–Kirchhoff stress P = ∂W/∂F, 3 × 3 [stress]."""
         F = ufl.variable(self.deformation_gradient(u))
+        if self._mixed is not None:
+            return ufl.diff(self._energy(F, None)[0], F) + self._mixed.pressure * cofactor(F)
         return ufl.diff(sum(self._energy(F, self._temperature())), F)
 
     def cauchy_stress(self, u: Expr) -> Expr:
@@ -132,11 +141,15 @@ class Solid(Term):
 
     def strain_energy_density(self, u: Expr) -> Expr:
         """Strain energy per reference volume W [energy/length³]."""
-        return sum(self._energy(self.deformation_gradient(u), self._temperature()))
+        return sum(self._parts(u, self._temperature()))
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of the elastic and viscous stresses."""
-        work = ufl.derivative(self._stored(self.state.u), self.state.u, v)
+        u = self.state.u
+        work = ufl.derivative(self._stored(u), u, v)
+        if self._mixed is not None:
+            J = ufl.det(self.deformation_gradient(u))
+            work += self._mixed.pressure * ufl.derivative(J, u, v) * self.measures[0]
         if self.viscosity:
             E, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
             rate = (E - old) / self.state.dt
@@ -144,6 +157,26 @@ class Solid(Term):
         if self._overstress is not None:
             work += self._overstress.residual(v)
         return work
+
+    def prepare(self) -> None:
+        """Project the volume change of mixed elements. Collective."""
+        if self._mixed is not None:
+            self._mixed.prepare()
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
+        """Add, times a displacement, the tangent that goes through the projected volume change. Collective."""
+        if self._mixed is not None and along is not None:
+            self._mixed.add_forces(b, along)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add the tangent that goes through the projected volume change. Collective."""
+        if self._mixed is not None:
+            self._mixed.add_tangent(A)
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros for it. Collective."""
+        if self._mixed is not None:
+            self._mixed.add_pattern(A)
 
     def begin(self, time: float) -> None:
         """Relax the overstress over the step."""
@@ -162,6 +195,7 @@ class Solid(Term):
 
     def energies(self) -> dict[str, float]:
         """Strain energy, work of viscous stresses and minus the strain energy brought by heat so far. Collective."""
+        self.prepare()
         viscous = self._viscous + (0.0 if self._overstress is None else self._overstress.work)
         return {"strain": integrate(self._energy_form), "viscous": viscous, "thermoelastic": self._thermal}
 
@@ -212,7 +246,7 @@ class Solid(Term):
             )
         # a marker for each rule, hence a kernel for each: FFCx 0.9 mixes the Jacobians of two rules up within a kernel
         # when one of them has a single point
-        degrees = full, full if volumetric == "full" else max(full - 2, 1)
+        degrees = full, max(full - 2, 1) if volumetric == "reduced" else full
         first, second = (
             self.state.measures.cells(self.cells)(metadata={"quadrature_degree": degree}) for degree in degrees
         )
@@ -244,9 +278,27 @@ class Solid(Term):
         shear, volumetric = self._law.energy(F / stretch)
         return factor * stretch**3 * shear, stretch**3 * volumetric
 
-    def _stored(self, u: Expr, T: Expr | None = None) -> ufl.Form:
-        T = self._temperature() if T is None else T
+    def _parts(self, u: Expr, T: Expr | None) -> tuple[Expr, Expr]:
+        """Both parts of the strain energy per reference volume ; mixed elements know that of the state only."""
         shear, volumetric = self._energy(self._deformation_gradient(u, T), T)
+        return shear, volumetric if self._mixed is None else self._volumetric(self._mixed.value)
+
+    def _volumetric(self, J: Expr) -> Expr:
+        """Volumetric part of the strain energy as a function of the volume change."""
+        return self._law.energy(J ** (1 / 3) * ufl.Identity(3))[1]
+
+    def _projected(self) -> VolumeChange:
+        cell = self.state.mesh.topology.cell_name()
+        require("volumetric", "mixed", cell in ("quadrilateral", "hexahedron"), f"'reduced' on a {cell}")
+        require("volumetric", "mixed", self.plane == "strain", "'full' or 'reduced' in plane stress")
+        require("volumetric", "mixed", self.temperature is None, "'full' or 'reduced' with thermal expansion")
+        kind = type(self.material).__name__
+        require("volumetric", "mixed", _by_volume(self.material), f"'full' or 'reduced' for {kind}")
+        J = ufl.det(self.deformation_gradient(self.state.u))
+        return VolumeChange(self.state, J, self._volumetric, self.measures[0], self.cells)
+
+    def _stored(self, u: Expr, T: Expr | None = None) -> ufl.Form:
+        shear, volumetric = self._parts(u, self._temperature() if T is None else T)
         dx, dx_volumetric = self.measures
         return shear * dx + volumetric * dx_volumetric
 
@@ -260,3 +312,10 @@ class Solid(Term):
     def _viscous_work(self) -> ufl.Form:
         new, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
         return self._viscosity / self.state.dt * ufl.inner(new - old, new - old) * self.measures[0]
+
+
+def _by_volume(material: Material) -> bool:
+    """Whether the volumetric part is a function of det F: a stretch and a growth of the same volume tell."""
+    stretch, growth = np.diag([2.0, 1.0, 1.0]), 2 ** (1 / 3) * np.eye(3)
+    first, second = (float(material.energy(ufl.as_matrix(F.tolist()))[1](())) for F in (stretch, growth))
+    return abs(first - second) < 1e-9 * abs(first)

@@ -310,6 +310,8 @@ class NonlinearProblem:
         self.u.x.scatter_forward()
 
     def _assemble_residual(self, *, lift: bool) -> None:
+        for term in self._terms:
+            term.prepare()
         r = self._r.array
         r[:] = 0.0
         fem.assemble_vector(r, self._L)
@@ -348,6 +350,8 @@ class NonlinearProblem:
     def _evaluate_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Called by SNES."""
         self._assign(x)
+        for term in self._terms:
+            term.prepare()
         self._tangent.assemble(self.bcs)
 
     def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:

@@ -43,6 +43,9 @@ class Term:
         """Maps from mesh entities to the cells of submeshes on which coefficients of the term live."""
         return {}
 
+    def prepare(self) -> None:
+        """Bring coefficients of forms to the present displacement; for terms that assemble, before each assembly."""
+
     def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
         """Add forces that are no form, at the present displacement. Collective.
 

@@ -14,6 +14,7 @@ LAYERS = [
     {"materials", "stretches", "rubbers", "directions", "fibres", "anisotropic", "library"},
     {"cohesive", "contact", "friction", "tools", "triangulation", "schemes", "thermoelastic", "meshing", "space"},
     {"state", "terms", "points", "viscoelastic", "slip", "temperature", "preconditioners", "tangent", "pairing"},
+    {"volume_change"},
     {"heat_balance", "contact_heat", "heat_exchange"},
     {"interface_law", "interface_history", "outer_surface", "pair_points", "pair_kinematics"},
     {"pair_law", "pair_forces", "surface_pass", "surface_pair"},
