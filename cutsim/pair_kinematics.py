@@ -36,13 +36,14 @@ class PairKinematics:
         size: Mean size of the slave facets [length].
 
     Attributes:
+        search: Largest distance of a partner; it may change between steps [length].
         tables: Shape functions and derivatives at the points of a slave facet.
         version: Grows when other facets have come near each other.
         near: Slave and master facets that are near each other.
     """
 
     def __init__(self, slave: OuterSurface, master: Master, *, fixed: bool, search: float, size: float) -> None:
-        self.slave, self.master, self.fixed, self._search = slave, master, fixed, search
+        self.slave, self.master, self.fixed, self.search = slave, master, fixed, search
         shape = slave.shape.element
         places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
         self.tables = slave.shape.values(places)
@@ -108,7 +109,7 @@ class PairKinematics:
 
     def _fixed_jump(self, points: Points, hits: Hits, distance: Array) -> Array:
         jump = np.zeros_like(points.x)
-        jump[:, 0] = self._search
+        jump[:, 0] = self.search
         jump[hits.points] = np.einsum("nai,ni->na", points.frames[hits.points], distance) - self._offset[hits.points]
         return jump
 
@@ -116,7 +117,7 @@ class PairKinematics:
         """The jump, and its rate with the place on the master facet."""
         frames, y = self._old.frames[hits.points, 1:], self._old_nodes[1][hits.facets]
         before = np.einsum("nb,nbi->ni", values, y) - self._old.x[hits.points]
-        jump = np.column_stack([np.full(len(self._slid), self._search), self._slid])
+        jump = np.column_stack([np.full(len(self._slid), self.search), self._slid])
         # surfaces that just touch count as pressed: rounding would decide which points feel the other one
         touch = TOUCH * self._size
         jump[hits.points, 0] = np.where(np.abs(hits.gap) <= touch, -touch, hits.gap)
@@ -144,19 +145,20 @@ class PairKinematics:
         slaves, masters = self.near
         of_facet = slaves[:, None] * count + np.arange(count)
         pairs = of_facet.ravel(), np.repeat(masters, count)
-        return project(points.x, points.frames, pairs, nodes[1], self.master.sides, self.master.shape, self._search)
+        return project(points.x, points.frames, pairs, nodes[1], self.master.sides, self.master.shape, self.search)
 
     def _moved(self, nodes: tuple[Array, Array]) -> bool:
-        """Whether the surfaces may have come nearer than the margin since they were last searched."""
+        """Whether rays may have come nearer to other facets than the margin since these were last searched."""
         slave, master = (np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, self._seen, strict=True))
-        total = self.slave.maximum(float(np.nan_to_num(slave + master, nan=np.inf)))
+        farther = max(self.search - self._seen_search, 0.0)
+        total = self.slave.maximum(float(np.nan_to_num(slave + master + farther, nan=np.inf)))
         return self._margin < total < WILD * self._margin
 
     def _look_around(self, points: Points, nodes: tuple[Array, Array]) -> None:
         """Find the facets that are near each other."""
-        count, ray = len(self.tables[0]), self._search * points.frames[:, 0]
+        count, ray = len(self.tables[0]), self.search * points.frames[:, 0]
         shape = len(nodes[0]), count, points.x.shape[-1]
         rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
         self.near = near_facets(rays, nodes[1], self._margin)
-        self._seen = nodes
+        self._seen, self._seen_search = nodes, self.search
         self.version += 1

@@ -178,6 +178,8 @@ class SurfacePass:
             change = kinematics.at_stencil(along, pairs, rows)
             forces += np.einsum("nricj,ncj->nri", pair_forces.tangents(kinematics, pairs, tractions, rows), change)
         dofs = self.dofs(pair_forces.nodes(kinematics, pairs, rows))
+        # nodes of a rigid master have none; matrices pass over them unasked
+        b.setOption(PETSc.Vec.Option.IGNORE_NEGATIVE_INDICES, True)
         b.setValues(dofs.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
 
     def add_tangent(self, A: PETSc.Mat) -> None:

@@ -66,8 +66,8 @@ class TriangulatedTool(RigidTool):
         path: Motion of the reference point.
         contact: Contact law; the pressure acts per reference area.
         friction: Friction law, None for none; without a tangential penalty of its own it takes that of the contact law.
-        search: Largest distance of a partner, on either side [length]; by default the mean size of the facets.  The
-            tool must not come nearer by more than this in a step.
+        search: Largest distance of a partner, on either side, beyond what the tool moves in the step [length]; by
+            default the mean size of the facets.
         name: Name in messages and output.
 
     Raises:
@@ -96,9 +96,9 @@ class TriangulatedTool(RigidTool):
         points = slave_points(state, facets)
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, self.position, self._position_old)
-        kinematics = PairKinematics(
-            OuterSurface(state.V, points.facets), master, fixed=False, search=search or size, size=size
-        )
+        self._search = search or size
+        slave = OuterSurface(state.V, points.facets)
+        kinematics = PairKinematics(slave, master, fixed=False, search=self._search, size=size)
         laws = PairLaws(None, contact, friction, None, None)
         self.touch = SurfacePass(state, points, kinematics, laws, weight=1.0)
 
@@ -128,6 +128,8 @@ class TriangulatedTool(RigidTool):
     def begin(self, time: float) -> None:
         """Move the tool; the slide of the step counts from the committed displacement."""
         super().begin(time)
+        # at first the body has not given way: it is in the tool as deep as that has moved
+        self.touch.kinematics.search = self._search + float(np.linalg.norm(self.displacement))
         self.touch.begin()
 
     def evaluate(self) -> None:
