@@ -31,7 +31,7 @@ from cutsim.temperature import Temperature
 from cutsim.thermoelastic import ThermoElastic
 from cutsim.tool_contact import ToolContact
 from cutsim.tool_heat import ToolHeat
-from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
+from cutsim.tools import Ball, Blade, FlatPunch, Needle, Path, Plane
 from cutsim.triangulated_tool import TriangulatedTool
 from cutsim.triangulation import Triangulation
 from cutsim.viscoelastic import Prony
@@ -67,6 +67,7 @@ __all__ = [
     "Material",
     "Mechanics",
     "MooneyRivlin",
+    "Needle",
     "NeoHookean",
     "Newmark",
     "Ogden",

@@ -47,6 +47,33 @@ def _hypot(a: Expr, b: Expr, scale: float) -> Expr:
     return ufl.sqrt(a**2 + b**2 + (1e-8 * scale) ** 2)
 
 
+def _pointed(across: Expr, above: Expr, half_angle: float, width: float, radius: float) -> Expr:
+    """Distance to a pointed body with a rounded tip and joint, in the plane of its axis.
+
+    Args:
+        across: Distance from the axis, or < 0 where the body goes on without end.
+        above: Height above the tip of the core, in the body.
+        half_angle: Angle between axis and flank.
+        width: Half width of the shank of the core, a convex polygon.
+        radius: Radius of tip and joint, by which the body is larger than its core.
+    """
+    height = width / tan(half_angle)
+    s, c = sin(half_angle), cos(half_angle)
+    along = across * s + above * c
+    length = (width**2 + height**2) ** 0.5
+    tip = ufl.conditional(ufl.lt(across, 0), -above, _hypot(across, above, radius))
+    flank = across * c - above * s
+    joint = _hypot(across - width, above - height, radius)
+    shank = ufl.conditional(ufl.gt(above, height), across - width, joint)
+    return ufl.conditional(ufl.lt(along, 0), tip, ufl.conditional(ufl.lt(along, length), flank, shank)) - radius
+
+
+def _from_axis(x: Expr, push: Direction, scale: float) -> Expr:
+    """Distance from the axis along push, differentiable on it."""
+    radial = x - _along(x, push) * ufl.as_vector(push)
+    return ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * scale) ** 2)
+
+
 @dataclass(frozen=True)
 class Blade:
     """Wedge blade: rounded tip, flank at the half angle, parallel shank; its edge extends without end.
@@ -122,19 +149,54 @@ class Blade:
 
     def distance(self, x: Expr) -> Expr:
         """Distance to the sharp core (a convex polygon) minus the tip radius [length]."""
-        r, width, height = self.tip_radius, self.half_thickness - self.tip_radius, self.flank_height
         across = _along(x, self.lateral)
         across = abs(across) if self.side == 0 else self.side * across
-        above = -_along(x, self.push) - r  # from the core's tip into the blade
-        s, c = sin(self.half_angle), cos(self.half_angle)
-        along = across * s + above * c
-        length = (width**2 + height**2) ** 0.5
-        tip = ufl.conditional(ufl.lt(across, 0), -above, _hypot(across, above, r))
-        flank = across * c - above * s
-        joint = _hypot(across - width, above - height, r)
-        shank = ufl.conditional(ufl.gt(above, height), across - width, joint)
-        core = ufl.conditional(ufl.lt(along, 0), tip, ufl.conditional(ufl.lt(along, length), flank, shank))
-        return core - r
+        above = -_along(x, self.push) - self.tip_radius  # from the core's tip into the blade
+        return _pointed(across, above, self.half_angle, self.half_thickness - self.tip_radius, self.tip_radius)
+
+
+@dataclass(frozen=True)
+class Needle:
+    """Round needle: cone with a rounded tip, cylindrical shaft; for 3-D and bodies of revolution.
+
+    In a plane problem it is a wedge blade.
+
+    Args:
+        half_angle: Angle between axis and cone [rad], in (0, π/2).
+        tip_radius: Radius r > 0 of the tip and of the joint of cone and shaft [length].
+        radius: Radius of the shaft, > r [length].
+        push: Direction in which the needle points; the reference point is the foremost point of the tip.
+
+    Raises:
+        ValueError: A value is outside its range.
+    """
+
+    half_angle: float
+    tip_radius: float
+    radius: float
+    push: Direction = (0.0, -1.0)
+
+    def __post_init__(self) -> None:
+        require("half_angle", self.half_angle, 0 < self.half_angle < pi / 2, "in (0, pi/2) rad")
+        require("tip_radius", self.tip_radius, self.tip_radius > 0, "> 0")
+        require("radius", self.radius, self.radius > self.tip_radius, f"> tip_radius = {self.tip_radius}")
+        object.__setattr__(self, "push", _unit("push", self.push))
+
+    @property
+    def resolution(self) -> float:
+        """Tip radius [length]."""
+        return self.tip_radius
+
+    @property
+    def shaft_height(self) -> float:
+        """Height above the foremost point at which the shaft begins [length]."""
+        return (self.radius - self.tip_radius) / tan(self.half_angle) + self.tip_radius
+
+    def distance(self, x: Expr) -> Expr:
+        """Distance to the sharp core (a cone with a cylinder) minus the tip radius [length]."""
+        across = _from_axis(x, self.push, self.tip_radius)
+        above = -_along(x, self.push) - self.tip_radius
+        return _pointed(across, above, self.half_angle, self.radius - self.tip_radius, self.tip_radius)
 
 
 @dataclass(frozen=True)
@@ -198,10 +260,8 @@ class FlatPunch:
     def distance(self, x: Expr) -> Expr:
         """Distance to the core, a flat disc with a straight shank, minus the edge radius [length]."""
         r = self.edge_radius
-        height = _along(x, self.push)
-        radial = x - height * ufl.as_vector(self.push)
-        across = ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * r) ** 2) - (self.radius - r)
-        below = height + r
+        across = _from_axis(x, self.push, r) - (self.radius - r)
+        below = _along(x, self.push) + r
         corner = _hypot(across, below, r)
         side = ufl.conditional(ufl.lt(below, 0), across, corner)
         face = ufl.conditional(ufl.lt(across, 0), below, corner)

@@ -55,6 +55,11 @@ def test_user_guide(tmp_path, monkeypatch):
     assert {path.name for path in (tmp_path / "results").iterdir()} >= {"history.csv", "displacement.bp", "force.png"}
 
 
+def test_elements():
+    names = run_page("elements")
+    assert names["force"] == pytest.approx(names["hertz"], rel=0.02)
+
+
 def test_friction():
     last = run_page("friction")["rows"][-1]
     assert last["crack_slipping"][0] == pytest.approx(1.0), "the page's block slips in the end"

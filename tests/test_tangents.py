@@ -17,7 +17,7 @@ from cutsim.materials import LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.points import Surface
 from cutsim.rubbers import MooneyRivlin
 from cutsim.tool_contact import ToolContact
-from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
+from cutsim.tools import Ball, Blade, FlatPunch, Needle, Path, Plane
 
 STEPS = np.array([1e-2, 5e-3, 2.5e-3])
 
@@ -246,6 +246,7 @@ SHAPES = {
     "sphere": (Ball(0.8), (0.3, 0.4, 1.7)),
     "cylinder in 3-D": (Ball(0.8, (1.0, 0.2, 0.1)), (0.3, 0.4, 1.7)),
     "punch in 3-D": (FlatPunch(0.5, 0.2, (0.0, 0.0, -1.0)), (0.1, 0.2, 0.93)),
+    "needle in 3-D": (Needle(0.4, 0.2, 0.5, (0.0, 0.0, -1.0)), (0.4, 0.45, 0.9)),
     "plane in 3-D": (Plane((0.1, 0.1, -1.0)), (0.5, 0.5, 0.97)),
 }
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import ufl
 
-from cutsim.tools import Ball, Blade, FlatPunch, Path, Plane
+from cutsim.tools import Ball, Blade, FlatPunch, Needle, Path, Plane
 
 HALF, R, SHANK = 0.4, 0.3, 0.9  # half angle, tip radius, half thickness of the blade
 BLADE = Blade(HALF, R, SHANK)
@@ -72,6 +72,7 @@ OUTLINES = {
     "blade": (BLADE, blade_outlines()[0], (0.0, 2.0)),
     "right half": (Blade(HALF, R, SHANK, side=1), blade_outlines()[1], (0.0, 2.0)),
     "left half": (Blade(HALF, R, SHANK, side=-1), blade_outlines()[-1], (0.0, 2.0)),
+    "needle": (Needle(HALF, R, SHANK), blade_outlines()[0], (0.0, 2.0)),
     "cylinder": (Ball(0.8), arc((0, 0), 0.8, 0, 2 * np.pi), (0.0, 0.0)),
     "punch": (FlatPunch(0.7, 0.2), punch_outline(), (0.0, 2.0)),
 }
@@ -136,9 +137,9 @@ def test_shapes_in_three_dimensions(shape, exact):
     np.testing.assert_allclose(np.linalg.norm(gradient, axis=1), 1, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["blade", "punch"])
+@pytest.mark.parametrize("kind", ["blade", "punch", "needle"])
 def test_three_dimensional_shape_is_the_plane_one_swept(kind):
-    """A blade is the same all along its edge, a punch all round its axis; both in any orientation."""
+    """A blade is the same all along its edge, punch and needle all round their axis; all in any orientation."""
     rng = np.random.default_rng(3)
     push, lateral = np.array([0.0, 0.6, -0.8]), np.array([1.0, 0.0, 0.0])
     third = np.cross(push, lateral)
@@ -148,7 +149,8 @@ def test_three_dimensional_shape_is_the_plane_one_swept(kind):
         solid, plane = Blade(HALF, R, SHANK, tuple(push), tuple(lateral)), BLADE
         points = flat[:, :1] * lateral - flat[:, 1:] * push + along[:, None] * third
     else:
-        solid, plane = FlatPunch(0.7, 0.2, tuple(push)), FlatPunch(0.7, 0.2)
+        kind, sizes = {"punch": (FlatPunch, (0.7, 0.2)), "needle": (Needle, (HALF, R, SHANK))}[kind]
+        solid, plane = kind(*sizes, tuple(push)), kind(*sizes)
         radial = np.cos(along)[:, None] * lateral + np.sin(along)[:, None] * third
         points = flat[:, :1] * radial - flat[:, 1:] * push
     np.testing.assert_allclose(values(solid, points)[0], values(plane, flat)[0], atol=1e-9)
@@ -174,6 +176,10 @@ def test_half_width_is_the_outline():
         (Ball, (1.0, (0, 0, 0)), "axis"),
         (FlatPunch, (0.1, 0.1), "radius"),
         (FlatPunch, (1.0, 0.0), "edge_radius"),
+        (Needle, (0.0, 0.1, 1.0), "half_angle"),
+        (Needle, (0.2, 0.0, 1.0), "tip_radius"),
+        (Needle, (0.2, 0.1, 0.1), "radius"),
+        (Needle, (0.2, 0.1, 1.0, (0, 0)), "push"),
         (Plane, ((0, 0),), "normal"),
     ],
 )
