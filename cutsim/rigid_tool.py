@@ -83,7 +83,8 @@ class RigidTool(Term):
         columns = {f"{self.name}_{_AXES[i]}": (float(self.position.value[i]), "length") for i in range(gdim)}
         columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
         axes = _AXES if gdim == 3 else "z"
-        columns |= {f"{self.name}_moment_{a}": (float(m), "moment") for a, m in zip(axes, couple, strict=True)}
+        if not self.state.axisymmetric:  # moments of a ring balance each other
+            columns |= {f"{self.name}_moment_{a}": (float(m), "moment") for a, m in zip(axes, couple, strict=True)}
         if self.slips:
             sticks, slips = np.sum([slip.areas() for slip in self.slips], axis=0)
             kind = self.state.facet_measure

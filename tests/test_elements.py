@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import EXPONENTIAL, make_blocks, slopes
+from conftest import EXPONENTIAL, history, make_blocks, slopes
 from dolfinx import fem, mesh
 from dolfinx.fem import petsc
 from mpi4py import MPI
@@ -31,7 +31,7 @@ from cutsim.state import State
 from cutsim.stepping import StepControl, run
 from cutsim.temperature import Temperature
 from cutsim.tool_contact import ToolContact
-from cutsim.tools import Ball, Path
+from cutsim.tools import Ball, Needle, Path
 from cutsim.viscoelastic import Prony
 
 E = 2.0
@@ -255,6 +255,34 @@ def test_ball_pressed_into_a_cylinder_balances_the_support():
         assert last["ball_force_y"] > 0.05
         errors.append(abs(last["energy_closure"]))
     assert errors[1] < 0.4 * errors[0] and errors[1] < 2e-2
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("friction", [None, Coulomb(0.2)], ids=["smooth", "rough"])
+def test_needle_through_a_hollow_cylinder(friction):
+    """The shaft widens an incompressible cylinder; force = μ × pressure × area, all of it dissipated on the shaft."""
+    b, step = Body(rectangle([(1, 0), (3, 1)], (6, 8))), 0.02
+    needle = Needle(0.4, 0.3, 1.2)
+    path = Path.polyline([0, 1], [(0.0, 1.0), (0.0, -needle.shaft_height - 0.5)])
+    hole = Surface.exterior(b.state, b.where(at(0, 1)))
+    tool = ToolContact(b.state, needle, path, [hole], contact=PenaltyContact(400.0, 0.01), friction=friction)
+    index_map = b.state.mesh.topology.index_map(2)
+    cells = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    hold = Support(b.state, cells, 1, dim=2, name="hold")
+    solid = Solid(b.state, IsochoricNeoHookean(E, 0.4999), volumetric="mixed")
+    rows = history(Mechanics(b.state, [solid, tool], [hold]), 1.0, StepControl.fixed(step))
+    wide = 1 + b.at(1, 0.5)[0]
+    assert wide == pytest.approx(1.2, abs=0.006), "but for the penalty's penetration"
+    x = np.linspace(wide, np.sqrt(9 + wide**2 - 1), 20001)
+    squared = x**2 / (x**2 - wide**2 + 1)
+    pressure = E / 3 * np.trapezoid((squared - 1 / squared) / x, x)
+    expected = 0.0 if friction is None else 0.2 * pressure * 2 * np.pi * wide
+    assert rows["tool_force_y"][-1] == pytest.approx(expected, rel=1e-2, abs=1e-9)
+    np.testing.assert_allclose(rows["hold_force"], rows["tool_force_y"], rtol=1e-6, atol=1e-9)
+    travel = rows["tool_y"][-2] - rows["tool_y"][-1]
+    assert np.diff(rows["energy_friction"])[-1] == pytest.approx(expected * travel, rel=1e-2)
+    assert abs(rows["energy_closure"][-1]) < 5e-3
+    assert "tool_moment_z" not in rows
 
 
 def ring(inner, outer, height, flux=None):
