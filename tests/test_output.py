@@ -224,6 +224,7 @@ def test_progress_lets_errors_and_interrupts_pass(terminal, monkeypatch):
 def test_sigint_reaches_a_run_with_progress():
     program = (
         "import os, signal\nfrom mpi4py import MPI\nfrom cutsim.progress import Progress\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # background jobs start with it ignored
         "with Progress(1.0, MPI.COMM_WORLD) as p:\n"
         "    p.update(0.5)\n    os.kill(os.getpid(), signal.SIGINT)\n    p.update(0.7)\n"
     )
