@@ -70,6 +70,7 @@ class VolumeChange:
         self._local = nodes * bs + self._dofs % bs
         mass = _Blocks(q * trial * measure, self._m, self._cells)
         self._inverse = np.linalg.inv(mass.assemble())
+        self.prepare()
 
     def prepare(self) -> None:
         """Project volume change and pressure at the present displacement. Collective."""
