@@ -96,8 +96,8 @@ def _load(file: Path | str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Nodes and facets of a file."""
     words = io.StringIO()
     try:
-        # meshio prints what is wrong and leaves the interpreter
-        with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words):
+        # meshio prints what is wrong and leaves the interpreter; it takes text for a large number first
+        with np.errstate(over="ignore"), contextlib.redirect_stdout(words), contextlib.redirect_stderr(words):
             mesh = meshio.read(file)
     except SystemExit:
         raise ValueError(" ".join(words.getvalue().split())) from None

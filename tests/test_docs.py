@@ -66,6 +66,16 @@ def test_friction():
     assert last["energy_friction"][0] > 0 and abs(last["energy_closure"][0]) < 1e-2
 
 
+def test_large_sliding():
+    page = run_page("large_sliding")
+    last = {name: value for name, (value, _) in page["rows"][-1].items()}
+    assert last["pair_slipping"] > 0.9 and last["pair_sticking"] == 0, "the page's block slides"
+    # the normals of the block's bottom tilt
+    assert last["pair_force_x"] == pytest.approx(-0.3 * last["pair_force_y"], rel=0.05)
+    assert abs(last["energy_closure"]) < 0.01
+    assert page["cutting"].terms[1].name == "wedge"
+
+
 def test_dynamics():
     momenta = run_page("dynamics")["momenta"]
     assert len(momenta) > 50
