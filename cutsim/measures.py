@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import ufl
-from dolfinx.mesh import Mesh
+from dolfinx.mesh import Mesh, compute_midpoints
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.checks import require
@@ -56,7 +57,7 @@ class Measures:
         """Measure over local exterior facets; facets of ghost cells are left out. Collective.
 
         Raises:
-            ValueError: There is none on any rank.
+            ValueError: There is none on any rank, or some have no area because they are on the axis of rotation.
         """
         owned = self.mesh.topology.index_map(self._tdim).size_local
         to_cells = self.mesh.topology.connectivity(self._tdim - 1, self._tdim)
@@ -68,11 +69,21 @@ class Measures:
                 pairs.append((cells[0], int(np.flatnonzero(to_facets.links(cells[0]) == facet)[0])))
         found = self.mesh.comm.allreduce(len(pairs))
         require("facets", found, found > 0, "at least one exterior facet")
+        self._check_area(np.asarray(facets, dtype=np.int32))
         return self._add("ds", np.asarray(pairs))
 
     def interior(self, entities: NDArray[np.int32]) -> ufl.Measure:
         """Measure over interior facets given as rows (cell⁺, local facet⁺, cell⁻, local facet⁻)."""
         return self._add("dS", entities)
+
+    def _check_area(self, facets: NDArray[np.int32]) -> None:
+        """Refuse facets on the axis of rotation. Collective."""
+        if self._kind is not _Revolved:
+            return
+        size = self.mesh.comm.allreduce(self.mesh.geometry.x[:, 0].max(initial=0.0), MPI.MAX)
+        radii = compute_midpoints(self.mesh, self._tdim - 1, facets)[:, 0]
+        lost = self.mesh.comm.allreduce(int(np.sum(radii < 1e-9 * size)))
+        require("facets", f"{lost} on the axis of rotation", lost == 0, "facets that have an area")
 
     def _add(self, kind: str, entities: NDArray[np.integer]) -> ufl.Measure:
         marker = len(self._data[kind])

@@ -12,7 +12,6 @@ from dolfinx.mesh import Mesh, create_submesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.checks import require
 from cutsim.compat import form
 from cutsim.kinematics import Expr
 from cutsim.state import State
@@ -57,8 +56,6 @@ class FacetPoints:
         self._facet_to_cell[parents] = np.arange(len(parents), dtype=np.int32)
         self._owned = self.submesh.topology.index_map(fdim).size_local
         self.weights = self._assemble({"one": ufl.as_ufl(1.0)})()["one"]
-        smallest, largest = -self.maximum(-self.weights), self.maximum(self.weights)
-        require("facets", "on the axis of rotation", not smallest <= 1e-12 * largest, "facets that have an area")
 
     @property
     def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:

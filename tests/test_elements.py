@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import EXPONENTIAL, history, make_blocks, slopes
+from conftest import EXPONENTIAL, history, make_blocks, rotation, slopes
 from dolfinx import fem, mesh
 from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.optimize import brentq
+from test_sliding import Stack, stack
 from test_tangents import assert_slope_two, jump_part, smooth
 
 from cutsim.assembly import integrate
@@ -285,6 +286,35 @@ def test_needle_through_a_hollow_cylinder(friction):
     assert "tool_moment_z" not in rows
 
 
+@pytest.mark.mpi
+def test_cylinders_pressed_together_across_meshes_that_do_not_match():
+    """A pair of surfaces weighs rings, too: its force is the whole one, that of a uniform pressure."""
+    s = stack(((0, -1), (1, 0), (2, 2)), ((0, 0), (1, 1), (3, 2)))
+    s = Stack(State(s.state.V, axisymmetric=True), s.boxes)
+    material = NeoHookean(E, 0.3)
+    pair = s.pair(contact=PenaltyContact(1e3), two_pass=True)
+    axis = mesh.locate_entities_boundary(s.state.mesh, 1, at(0, 0.0))
+    supports = [Support(s.state, axis, 0), *s.drive(0, 0, (None, 0.0))]
+    supports += s.drive(1, 1, (None, lambda t: -0.2 * t), name="press")
+    last = final(Mechanics(s.state, [Solid(s.state, material), pair], supports, rtol=1e-11))
+    assert pair.force()[1] == pytest.approx(-last["press_y_force"], rel=1e-8)
+    assert last["press_y_force"] == pytest.approx(np.pi * uniaxial_stress(material, 0.9)[0], rel=5e-3)
+    assert last["pair_pressed"] == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_pressure_turns_and_grows_with_the_surface(gdim):
+    """Resultant −p a n on the current surface of a body that is turned and stretched."""
+    b = make_blocks(gdim)
+    up = gdim - 1
+    load = Pressure(b.state, b.face(up, 1.0), lambda t: 3.0)
+    R, stretch = rotation(gdim, 0.7), np.diag([1.4, *[1.0] * (gdim - 1)])
+    b.move(*2 * [lambda x: (R @ stretch - np.eye(gdim)) @ x[:gdim]])
+    load.evaluate()
+    force = [load.record()[f"pressure_force_{c}"][0] for c in "xyz"[:gdim]]
+    np.testing.assert_allclose(force, -3.0 * 1.4 * R[:, up], atol=1e-12)
+
+
 def ring(inner, outer, height, flux=None):
     """Hollow cylinder that conducts heat between its sides, or that a flux through its outer side warms."""
     b = Body(rectangle([(inner, 0), (outer, height)], (24, 1)))
@@ -350,6 +380,9 @@ REFUSED = {
     ),
     "solid": lambda b: JIntegral(Solid(b.state, NeoHookean(E, 0.3)), (0.5, 0.5), (1.0, 0.0), 0.1, 0.2),
     "facets": lambda b: Surface.exterior(b.state, b.where(at(0, 0))),
+    "facets of a load": lambda b: Pressure(
+        b.state, b.where(lambda x: np.isclose(x[0], 0) | np.isclose(x[1], 1)), lambda t: t
+    ),
 }
 
 
@@ -357,7 +390,7 @@ REFUSED = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_refuses_what_a_body_of_revolution_has_not(name):
     """Plane stress, lumped mass (a node on the axis has none), a J-integral per length, a surface on the axis."""
-    with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
+    with pytest.raises(ValueError, match=f"{name.split()[0]} = .* is not allowed"):
         REFUSED[name](Body(rectangle([(0, 0), (1, 1)], (2, 2))))
 
 
