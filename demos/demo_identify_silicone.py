@@ -101,7 +101,7 @@ class Specimen:
 
 
 BLOCK = {"dim": 2, "Lx": 3.0, "H": 4.5, "lc": 0.15, "band": 0.45, "growth": 1.6, "notch": 0.6}
-TALL = {True: Specimen(BLOCK, 3.6, 0.15), False: Specimen(BLOCK | {"H": 6.0}, 5.0, 0.1)}
+TALL = {True: Specimen(BLOCK, 3.5, 0.15), False: Specimen(BLOCK | {"H": 6.0}, 5.0, 0.1)}
 TRUE = {"toughness": 0.3, "friction": 0.1}
 GUESS = {"toughness": 0.4, "friction": 0.15}
 HALF_ANGLE, HALF_THICKNESS = float(np.arctan2(0.855, 4.2)), 0.855
@@ -156,35 +156,39 @@ def inverse(quick: bool, out: Path) -> Fit:
 # the specimen, 4.2 mm thick and on a plate, with the moduli and strengths of Table 5.1?  Friction was not measured, and
 # it matters as much: the answer is for the friction given.  The force is the largest until the tip is 0.2 mm above the
 # plate.  It grows with the toughness only while the crack runs: with the strength fixed a tougher bond opens further
-# before it breaks, and in the end it gives way like a spring.
+# before it breaks, and in the end it gives way like a spring.  Friction of 0.2, about the tangent of the half angle, is
+# taken; with it the softest silicone does not reach 9 N whatever its toughness (8.9 N at most), hence 0.23 there.
 
-FLAT = Specimen({"dim": 2, "Lx": 30, "H": 4.2, "lc": 0.15, "band": 0.45, "growth": 1.6, "notch": 0.6}, 4.0, 0.1)
+THIN = BLOCK | {"Lx": 30.0, "H": 4.2}
+FLAT = {True: Specimen(THIN, 4.0, 0.2), False: Specimen(THIN, 4.0, 0.1)}
 WIDTH, FORCE = 10.1, (9.0, 10.0)
-FRICTION = 0.22
+FRICTION = {1: 0.2, 2: 0.23, 3: 0.2, 4: 0.2}
 
 
-def toughness_of(number: int, domain: TaggedMesh, friction: float) -> tuple[dict[str, float], Curve]:
+def toughness_of(number: int, specimen: Specimen, domain: TaggedMesh) -> tuple[dict[str, float], Curve]:
     """Toughness at which the cut reaches the middle of the measured forces, and what the forces leave open."""
     record = material(f"silicone {number}")
     curves: dict[float, tuple[np.ndarray, np.ndarray]] = {}
 
     def largest(toughness: float) -> float:
-        values = {"toughness": toughness, "friction": friction}
-        depth, force = cut(domain, FLAT, record.material, record.strength, values)
+        values = {"toughness": toughness, "friction": FRICTION[number]}
+        depth, force = cut(domain, specimen, record.material, record.strength, values)
         curves[toughness] = depth, WIDTH * force
         return float(curves[toughness][1].max())
 
     target = float(np.mean(FORCE))
-    found = root_scalar(lambda g: largest(g) - target, x0=0.3, x1=0.36, rtol=5e-3, maxiter=12)
+    found = root_scalar(lambda g: largest(g) - target, x0=0.36, x1=0.4, rtol=5e-3, maxiter=12)
     best = min(curves, key=lambda g: abs(curves[g][1].max() - target))
-    slope = (largest(1.02 * best) - curves[best][1].max()) / (0.02 * best)
+    # a finite difference over steps that the run chooses itself: not too small
+    slope = (largest(1.05 * best) - largest(0.95 * best)) / (0.1 * best)
     result = {
-        "converged": float(found.converged),
+        "friction": FRICTION[number],
         "toughness": best,
         "force": float(curves[best][1].max()),
         "force_per_toughness": slope,
         "toughness_at_9_N": best + (FORCE[0] - target) / slope,
         "toughness_at_10_N": best + (FORCE[1] - target) / slope,
+        "converged": float(found.converged),
     }
     return result, Curve(*curves[best], f"silicone {number}, $G_c$ = {best:.3f} N/mm")
 
@@ -193,8 +197,7 @@ def toughness_of(number: int, domain: TaggedMesh, friction: float) -> tuple[dict
 
 
 def main(
-    quick: Annotated[bool, typer.Option("--quick", help="shorter cut, first silicone only")] = False,
-    friction: Annotated[float, typer.Option(min=0.0, help="friction of blade and silicones")] = FRICTION,
+    quick: Annotated[bool, typer.Option("--quick", help="shorter cut, second silicone only")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/identify_silicone"),
 ) -> None:
     """Identify modulus, Poisson's ratio, toughness and friction of silicones."""
@@ -202,8 +205,8 @@ def main(
     solid = NeoHookean(0.777, 0.48)
     fitted, poisson = tension(out / "tension.csv", solid)
     curve = inverse(quick, out)
-    domain = read_geo(MESH, COMM, FLAT.mesh, gdim=2)
-    silicones = {n: toughness_of(n, domain, friction) for n in ((1,) if quick else (1, 2, 3, 4))}
+    domain = read_geo(MESH, COMM, FLAT[quick].mesh, gdim=2)
+    silicones = {n: toughness_of(n, FLAT[quick], domain) for n in ((2,) if quick else (1, 2, 3, 4))}
     summary = {
         "young": fitted.fit.values["young"],
         "young_interval": list(fitted.fit.intervals()["young"]),
@@ -223,7 +226,7 @@ def main(
             [c for _, c in silicones.values()],
             xlabel="depth of the tip [mm]",
             ylabel="force on the blade [N]",
-            title="Four silicones that cut at 9 to 10 N",
+            title="Silicones that are cut at 9 to 10 N",
             references={"measured, 9 N": 9.0, "measured, 10 N": 10.0},
         )
         print(f"tension:\n{fitted.fit}\nPoisson's ratio {poisson:.4f}\ncut:\n{curve}")

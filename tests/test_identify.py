@@ -6,6 +6,7 @@ from collections import Counter
 import numpy as np
 import pytest
 from scipy import optimize, stats
+from test_docs import run_page
 from test_materials import ISOTROPIC, energy, name
 from test_materials_closed_forms import PATHS, incompressible, nominal
 
@@ -385,3 +386,13 @@ def test_bad_indentation_is_refused():
         poisson_ratio([([0.0, 0.1], [0.0])])
     with pytest.raises(ValueError, match="shape of force"):
         fit_shear_modulus([0.0, 1.0, 2.0], [1.0], 1.0, 0.3)
+
+
+# -- page -------------------------------------------------------------------------------------------------------------
+
+
+def test_page():
+    names = run_page("identification")
+    for parameter, (low, high) in names["found"].fit.intervals().items():
+        assert low < {"c1": 0.3, "c2": 0.1}[parameter] < high
+    assert names["spring"].values == pytest.approx({"stiffness": 2.0, "decay": 0.5}, rel=1e-4)
