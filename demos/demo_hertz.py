@@ -265,13 +265,14 @@ class Lines:
         return self.peak(load) * outer, self.friction * self.peak(load) * (outer - inner)
 
 
-STEEL = LinearElastic(200.0, 0.3)  # [GPa]
+STEEL = LinearElastic(200.0, 0.3)
 MINDLIN = Lines(STEEL, STEEL, 8.0, 8.0, 0.3, band=1.0, size=0.025, far=1.0, approach=0.1845, slide=0.0295)
 # NAFEMS CGS-1, 35 kN/mm
 CYLINDER = Lines(
     LinearElastic(210e3, 0.3), LinearElastic(70e3, 0.3), 50.0, 0.0, 0.1,
     band=9.0, size=0.25, far=15.0, approach=1.547, steps=(10, 0),
 )  # fmt: skip
+TITLES = {"mindlin": "Two cylinders drawn sideways", "cylinder": "NAFEMS CGS-1, cylinder on a block"}
 
 
 @dataclass(frozen=True)
@@ -438,7 +439,7 @@ def profile(contact: LineContact, last: dict[str, float], out: Path, title: str)
         towards = np.abs(measured["shear"][shown]) / contact.lines.friction
         curves.append(Curve(measured["x"][shown], towards, "shear over friction coefficient", "C1."))
         curves.append(Curve(x, shear / contact.lines.friction, "Cattaneo and Mindlin", "C1-"))
-    plot_curves(out, curves, xlabel="place [mm]", ylabel="traction", title=title)
+    plot_curves(out, curves, xlabel="place [mm]", ylabel="traction [MPa]", title=title)
 
 
 # ## The run
@@ -484,7 +485,7 @@ def main(
         contact = LineContact.build(replace(lines, size=1.6 * lines.size) if quick else lines)
         last = contact.run()
         results[name] = contact.result(last)
-        profile(contact, last, out / f"{name}.png", name)
+        profile(contact, last, out / f"{name}.png", TITLES[name])
     write_summary(out / "summary.json", results, COMM)
     if COMM.rank == 0:
         for name, result in results.items():
