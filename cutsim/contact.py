@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import ufl
 
 from cutsim.checks import require
-from cutsim.kinematics import Expr
+from cutsim.kinematics import Expr, positive_part
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class PenaltyContact:
         """Contact pressure p ≥ 0 [stress] at a penetration (positive inside) [length]."""
         s, c = penetration, self.blend
         if c == 0:
-            return self.stiffness * ufl.conditional(ufl.gt(s, 0), s, 0.0)
+            return self.stiffness * positive_part(s)
         quadratic = self.stiffness * s**2 / (4 * c)
         return ufl.conditional(
             ufl.lt(s, 0), 0.0, ufl.conditional(ufl.lt(s, 2 * c), quadratic, self.stiffness * (s - c))
@@ -51,7 +51,7 @@ class PenaltyContact:
         """Energy ∫ p dδ stored by the penalty [force/length]."""
         s, c = penetration, self.blend
         if c == 0:
-            return 0.5 * self.stiffness * ufl.conditional(ufl.gt(s, 0), s, 0.0) ** 2
+            return 0.5 * self.stiffness * positive_part(s) ** 2
         quadratic = self.stiffness * s**3 / (12 * c)
         linear = self.stiffness * (0.5 * (s - c) ** 2 + c**2 / 6)
         return ufl.conditional(ufl.lt(s, 0), 0.0, ufl.conditional(ufl.lt(s, 2 * c), quadratic, linear))

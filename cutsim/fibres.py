@@ -14,7 +14,7 @@ from scipy.integrate import lebedev_rule
 
 from cutsim.checks import require
 from cutsim.directions import Direction, require_axes, require_direction, squared_stretch, stretches_in
-from cutsim.kinematics import Expr
+from cutsim.kinematics import Expr, positive_part
 from cutsim.materials import Material, WithoutPlaneStress, isochoric_invariant
 
 
@@ -88,7 +88,7 @@ class ExponentialFibres:
 
     def energy(self, F: Expr) -> Expr:
         """Strain energy per reference volume."""
-        stretched = tension(squared_stretch(F, self.direction) - 1)
+        stretched = positive_part(squared_stretch(F, self.direction) - 1)
         exponent = self.exponential * stretched**self.power
         return self.modulus / (self.exponential * self.power) * (ufl.exp(exponent) - 1)
 
@@ -126,7 +126,7 @@ class DispersedFibres:
         """Strain energy per reference volume."""
         I4 = ufl.det(F) ** (-2 / 3) * squared_stretch(F, self.direction)
         kappa = self.dispersion
-        strain = tension(kappa * (isochoric_invariant(F) - 3) + (1 - 3 * kappa) * (I4 - 1))
+        strain = positive_part(kappa * (isochoric_invariant(F) - 3) + (1 - 3 * kappa) * (I4 - 1))
         return self.k1 / (2 * self.k2) * (ufl.exp(self.k2 * strain**2) - 1)
 
 
@@ -173,9 +173,4 @@ class EllipsoidalFibres:
 
     def _of_stretch(self, C: list[list[Expr]], n: NDArray[np.float64]) -> Expr:
         squared = sum(float(n[i] * n[j]) * C[i][j] for i in range(3) for j in range(3) if n[i] * n[j])
-        return tension(squared - 1) ** self.power
-
-
-def tension(x: Expr) -> Expr:
-    """Positive part ⟨x⟩."""
-    return ufl.conditional(ufl.gt(x, 0), x, 0.0)
+        return positive_part(squared - 1) ** self.power

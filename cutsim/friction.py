@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 import ufl
 
 from cutsim.checks import require
-from cutsim.kinematics import Expr
+from cutsim.kinematics import Expr, positive_part
 
 # far below any slip, so that directions are differentiable at rest [length]
 _REST = 1e-20
@@ -80,7 +80,7 @@ class Coulomb:
             return self.mu * pressure
         require("temperature", temperature, temperature is not None, "a temperature: the coefficient depends on it")
         left: Expr = self.T_damage - temperature  # type: ignore[operator]
-        share = ufl.conditional(ufl.gt(left, 0), left, 0.0) / (self.T_damage - self.T_ref)
+        share = positive_part(left) / (self.T_damage - self.T_ref)
         return self.mu * share**2 * pressure
 
     def traction(self, slip: Expr, pressure: Expr, dt: Expr, temperature: Expr | None) -> Expr:

@@ -1,6 +1,7 @@
 """Heat through the boundary: given flux, convection, given temperature. All areas are those of the reference."""
 
 import math
+from abc import ABC, abstractmethod
 
 import numpy as np
 import ufl
@@ -17,7 +18,7 @@ from cutsim.space import locate_dofs
 from cutsim.temperature import Temperature
 
 
-class _SurfaceHeat(HeatTerm):
+class _SurfaceHeat(HeatTerm, ABC):
     """Heat through a part of the boundary, `_influx` per reference area; it follows one number that varies in time."""
 
     def __init__(
@@ -29,9 +30,9 @@ class _SurfaceHeat(HeatTerm):
         self._value = Schedule(self.state.mesh, value)
         self._flow = form(self._influx() * self._ds)
 
+    @abstractmethod
     def _influx(self) -> Expr:
         """Heat flux into the body [power/area]."""
-        raise NotImplementedError
 
     @property
     def corners(self) -> tuple[float, ...]:

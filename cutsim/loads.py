@@ -1,8 +1,10 @@
 """Supports and loads."""
 
+from abc import ABC, abstractmethod
+
 import numpy as np
 import ufl
-from dolfinx import default_scalar_type, fem
+from dolfinx import fem
 from numpy.typing import NDArray
 
 from cutsim.assembly import global_dot, nodal_forces, resultant
@@ -81,23 +83,23 @@ class Support:
         return float(self.state.mesh.comm.allreduce(float(residual[self.dofs].sum())))
 
 
-class _Load(Term):
+class _Load(Term, ABC):
     """Load on a part of the boundary, `_density` per reference area; it follows one factor that varies in time."""
 
     def __init__(
         self, state: State, facets: NDArray[np.int32], factor: History, name: str, corners: tuple[float, ...]
     ) -> None:
-        self.name, self.state, self._factor, self._corners = name, state, factor, corners
+        self.name, self.state, self._corners = name, state, corners
         self._ds = state.measures.exterior(facets)
-        self._scale = fem.Constant(state.mesh, default_scalar_type(factor(0.0)))
-        self._scale_old = float(self._scale.value)
+        self._factor = Schedule(state.mesh, factor)
+        self._scale = self._factor.constant
         self._form = form(self.residual(ufl.TestFunction(state.V)))
         self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
         self._forces_old: NDArray[np.float64] = self._forces
 
+    @abstractmethod
     def _density(self) -> Expr:
         """Force per reference area at factor 1, a vector [stress]."""
-        raise NotImplementedError
 
     @property
     def corners(self) -> tuple[float, ...]:
@@ -110,11 +112,12 @@ class _Load(Term):
 
     def begin(self, time: float) -> None:
         """Set the load to its value at a time."""
-        self._scale.value = self._factor(time)
+        self._factor.begin(time)
 
     def rollback(self) -> None:
         """Set the load back to the start of the step."""
-        self._scale.value, self._forces = self._scale_old, self._forces_old
+        self._factor.begin(self.state.time_old)
+        self._forces = self._forces_old
 
     def evaluate(self) -> None:
         """Nodal forces of the load. Collective."""
@@ -131,8 +134,8 @@ class _Load(Term):
         return {f"{self.name}_force_{'xyz'[i]}": (float(f), "force") for i, f in enumerate(total)}
 
     def commit(self) -> None:
-        """Adopt the load."""
-        self._scale_old, self._forces_old = float(self._scale.value), self._forces
+        """Adopt the forces."""
+        self._forces_old = self._forces
 
 
 class Traction(_Load):

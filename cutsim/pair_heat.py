@@ -2,22 +2,17 @@
 
 from dataclasses import replace
 
-import numpy as np
-import ufl
-from numpy.typing import NDArray
-from petsc4py import PETSc
-
 from cutsim.checks import require
 from cutsim.contact_heat import ContactHeat
 from cutsim.heat_balance import HeatTerm
 from cutsim.heat_exchange import contact_columns
 from cutsim.heat_pass import HeatPass
-from cutsim.kinematics import Expr
 from cutsim.surface_pair import SurfacePair
 from cutsim.temperature import Temperature
+from cutsim.terms import AssembledTerm
 
 
-class PairHeat(HeatTerm):
+class PairHeat(AssembledTerm[HeatPass], HeatTerm):
     """Heat exchange across a pair of surfaces, with the dissipation of their friction and bond as its source.
 
     Pressure, partners and dissipation are those of the mechanical step, per reference area of the slave.  The interface
@@ -36,8 +31,6 @@ class PairHeat(HeatTerm):
         ValueError: The temperature has another state than the pair, or is of higher degree.
     """
 
-    assembles = True
-
     def __init__(
         self, temperature: Temperature, pair: SurfacePair, law: ContactHeat, *, name: str | None = None
     ) -> None:
@@ -50,29 +43,10 @@ class PairHeat(HeatTerm):
             for contact, master, side in zip(pair.passes, pair.facets[::-1], (law, swapped), strict=False)
         )
 
-    def residual(self, w: Expr) -> ufl.Form:
-        """No form: see `add_forces`."""
-        return ufl.Form([])
-
     @property
     def pattern(self) -> int:
         """Number of the sparsity pattern."""
         return self.pair.pattern
-
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
-        """Add the heat that leaves the bodies through the surfaces. Collective."""
-        for p in self.passes:
-            p.add_forces(b, along)
-
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add its derivative by the temperature. Collective."""
-        for p in self.passes:
-            p.add_tangent(A)
-
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros for all facets that are near each other. Collective."""
-        for p in self.passes:
-            p.add_pattern(A)
 
     def begin(self, time: float) -> None:
         """Take over partners, pressure and dissipation of the mechanical step. Collective."""

@@ -113,6 +113,10 @@ class Recording:
         require("column", name, name in self.history, f"one of {', '.join(self.history)}")
         return np.asarray(self.history[name])
 
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """All columns of the history so far."""
+        return {name: np.asarray(values) for name, values in self.history.items()}
+
     def __enter__(self) -> Self:
         return self
 

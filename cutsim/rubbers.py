@@ -4,6 +4,7 @@ The volumetric part of the invariant models is K/2 (ln J)², which is convex in 
 those of J^(−1/3) F.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import ufl
@@ -14,32 +15,44 @@ from cutsim.materials import WithoutPlaneStress, engineering_constants, isochori
 from cutsim.stretches import stretch_power_sums
 
 
-class _NearlyIncompressible(WithoutPlaneStress):
-    """Small-strain limit and volumetric energy of a material with a shear and a bulk modulus."""
-
-    bulk: float
+class _WithModuli(WithoutPlaneStress, ABC):
+    """Small-strain limit of a material with a shear and a bulk modulus."""
 
     @property
+    @abstractmethod
     def shear(self) -> float:
         """Shear modulus G of the small-strain limit [stress]."""
-        raise NotImplementedError
+
+    @abstractmethod
+    def _bulk(self) -> float:
+        """Bulk modulus K of the small-strain limit [stress]."""
 
     @property
     def young(self) -> float:
         """Young's modulus of the small-strain limit [stress]."""
-        return engineering_constants(self.shear, self.bulk)[0]
+        return engineering_constants(self.shear, self._bulk())[0]
 
     @property
     def poisson(self) -> float:
         """Poisson's ratio of the small-strain limit [–]."""
-        return engineering_constants(self.shear, self.bulk)[1]
+        return engineering_constants(self.shear, self._bulk())[1]
+
+
+class _NearlyIncompressible(_WithModuli):
+    """Volumetric energy beside that of the isochoric part."""
+
+    bulk: float
+
+    def _bulk(self) -> float:
+        return self.bulk
 
     def energy(self, F: Expr) -> tuple[Expr, Expr]:
         """Strain energy per reference volume, (fully integrated part, volumetric part)."""
         return self._distortion(F), 0.5 * self.bulk * ufl.ln(ufl.det(F)) ** 2
 
+    @abstractmethod
     def _distortion(self, F: Expr) -> Expr:
-        raise NotImplementedError
+        """Energy of the isochoric part of F."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +172,7 @@ class ArrudaBoyce(_NearlyIncompressible):
 
 
 @dataclass(frozen=True)
-class Ogden(WithoutPlaneStress):
+class Ogden(_WithModuli):
     """Ogden solid, W = Σ μᵢ/mᵢ² (λ₁ᵐ + λ₂ᵐ + λ₃ᵐ − 3 − mᵢ ln J) + c/2 (J−1)² (thesis 2.8).
 
     In the notation W = Σ μₚ/αₚ (λ₁ᵅ + λ₂ᵅ + λ₃ᵅ − 3) of Ogden, m = α and μ = μₚ αₚ.  With all μ > 0 each term has a
@@ -195,15 +208,8 @@ class Ogden(WithoutPlaneStress):
         """Shear modulus G = ½ Σ μᵢ [stress]."""
         return 0.5 * sum(self.moduli)
 
-    @property
-    def young(self) -> float:
-        """Young's modulus of the small-strain limit [stress]."""
-        return engineering_constants(self.shear, self.volumetric + 2 * self.shear / 3)[0]
-
-    @property
-    def poisson(self) -> float:
-        """Poisson's ratio of the small-strain limit [–]."""
-        return engineering_constants(self.shear, self.volumetric + 2 * self.shear / 3)[1]
+    def _bulk(self) -> float:
+        return self.volumetric + 2 * self.shear / 3
 
     def energy(self, F: Expr) -> tuple[Expr, Expr]:
         """Strain energy per reference volume, (fully integrated part, volumetric part)."""

@@ -1,27 +1,24 @@
 """Two outer surfaces, meshed apart, that find each other and slide far (docs/theory.md §3.5; thesis 4.28–4.57)."""
 
 import numpy as np
-import ufl
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from cutsim.checks import require
 from cutsim.cohesive import CohesiveLaw
 from cutsim.contact import PenaltyContact
 from cutsim.friction import FrictionLaw
-from cutsim.kinematics import Expr
 from cutsim.outer_surface import OuterSurface, SharedSurface
 from cutsim.pair_kinematics import PairKinematics
 from cutsim.pair_law import PairLaws
 from cutsim.sizes import facet_size, normal_size
 from cutsim.state import State
 from cutsim.surface_pass import SurfacePass, slave_points
-from cutsim.terms import Term
+from cutsim.terms import AssembledTerm
 
 _AXES = "xyz"
 
 
-class SurfacePair(Term):
+class SurfacePair(AssembledTerm[SurfacePass]):
     """Contact, friction or cohesion between two outer surfaces; their meshes need not match.
 
     The traction is integrated over the slave surface.  In two passes each surface is slave once, with half of the
@@ -55,7 +52,6 @@ class SurfacePair(Term):
     """
 
     symmetric = False
-    assembles = True
 
     def __init__(
         self,
@@ -101,10 +97,6 @@ class SurfacePair(Term):
             for i in range(1 + two_pass)
         )
 
-    def residual(self, v: Expr) -> ufl.Form:
-        """No form: see `add_forces`."""
-        return ufl.Form([])
-
     @property
     def facet_energy(self) -> float:
         """Energy that breaks a facet of mean size in opening; 0 without a law."""
@@ -115,21 +107,6 @@ class SurfacePair(Term):
     def pattern(self) -> int:
         """Number of the sparsity pattern."""
         return sum(p.pattern for p in self.passes)
-
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
-        """Add the virtual work ∫ T·(v_m − v_s) dΓ₀. Collective."""
-        for p in self.passes:
-            p.add_forces(b, along)
-
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add its exact derivative. Collective."""
-        for p in self.passes:
-            p.add_tangent(A)
-
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros for all facets that are near each other. Collective."""
-        for p in self.passes:
-            p.add_pattern(A)
 
     def begin(self, time: float) -> None:
         """The slide of the step counts from the committed displacement."""

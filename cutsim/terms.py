@@ -4,7 +4,8 @@ The object that owns a term writes it: its form, its moving constants, its histo
 `cutsim.mechanics` only adds terms up.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import ufl
@@ -105,3 +106,49 @@ class Term:
 
     def commit(self) -> None:
         """Adopt trial history."""
+
+
+class Assembler(Protocol):
+    """A part of a term that adds forces by itself; its methods are those of `Term`."""
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None) -> None:
+        """As `Term.add_forces`."""
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """As `Term.add_tangent`."""
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """As `Term.add_pattern`."""
+
+
+P = TypeVar("P", bound=Assembler)
+
+
+class AssembledTerm(Term, Generic[P]):
+    """A term all of whose forces are those of its passes, none of them a form.
+
+    Attributes:
+        passes: What adds the forces.
+    """
+
+    assembles = True
+    passes: Sequence[P]
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """No form: see `add_forces`."""
+        return ufl.Form([])
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
+        """Add the forces of all passes. Collective."""
+        for p in self.passes:
+            p.add_forces(b, along)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add their derivative. Collective."""
+        for p in self.passes:
+            p.add_tangent(A)
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros wherever the derivative may be. Collective."""
+        for p in self.passes:
+            p.add_pattern(A)

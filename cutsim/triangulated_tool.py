@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import basix
 import numpy as np
-import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -13,7 +12,6 @@ from cutsim.assembly import add_blocks, moment
 from cutsim.checks import require
 from cutsim.contact import PenaltyContact
 from cutsim.friction import FrictionLaw
-from cutsim.kinematics import Expr
 from cutsim.outer_surface import OuterSurface
 from cutsim.pair_kinematics import PairKinematics
 from cutsim.pair_law import PairLaws
@@ -23,6 +21,7 @@ from cutsim.sizes import facet_size
 from cutsim.slip import SlipHistory
 from cutsim.state import State
 from cutsim.surface_pass import SurfacePass, slave_points
+from cutsim.terms import AssembledTerm
 from cutsim.tools import Path
 from cutsim.triangulation import Triangulation
 
@@ -53,7 +52,7 @@ class RigidSurface:
         return np.zeros_like(self._corners)
 
 
-class TriangulatedTool(RigidTool):
+class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
     """Contact between a rigid tool of triangles and an outer surface of the body.
 
     The points of the body find the tool along their own normals, as in a pair of surfaces: the traction turns with the
@@ -75,7 +74,6 @@ class TriangulatedTool(RigidTool):
     """
 
     symmetric = False
-    assembles = True
 
     def __init__(
         self,
@@ -101,23 +99,12 @@ class TriangulatedTool(RigidTool):
         kinematics = PairKinematics(slave, master, fixed=False, search=self._search, size=size)
         laws = PairLaws(None, contact, friction, None, None)
         self.touch = SurfacePass(state, points, kinematics, laws, weight=1.0)
+        self.passes = (self.touch,)
 
     @property
     def slips(self) -> Sequence[SlipHistory]:
         """Memory of friction of the surface."""
         return [] if self.touch.slip is None else [self.touch.slip]
-
-    def residual(self, v: Expr) -> ufl.Form:
-        """No form: see `add_forces`."""
-        return ufl.Form([])
-
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
-        """Add the virtual work −∫ T·v dΓ₀. Collective."""
-        self.touch.add_forces(b, along)
-
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add its exact derivative. Collective."""
-        self.touch.add_tangent(A)
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros for all facets: the pattern never changes. Collective."""

@@ -164,7 +164,7 @@ def push(
         derived={"cauchy_stress": cut.solid.cauchy_stress(cut.state.u)},
     ) as recording:
         run(problem, until, control, recording)
-    history = {name: recording.column(name) for name in recording.history}
+    history = recording.columns()
     draw(cut, history, law, out, problem.fields.get("temperature"))
     if history["time"][-1] < until:
         raise typer.Exit(1)  # interrupted: what was recorded stays

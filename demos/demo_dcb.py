@@ -295,7 +295,7 @@ def draw(beam: Beam, recording: Recording, out: Path, title: str) -> None:
         if mesh.geometry.dim == 3:
             curves.append(Curve(w, beam.specimen.beam_curve(w, "stress"), "plane stress", ":"))
         plot_curves(out / "force.png", curves, xlabel="opening [mm]", ylabel="force [N]", title=title)
-        plot_energy(out / "energy.png", {k: np.asarray(v) for k, v in recording.history.items()}, xlabel="path [mm]")
+        plot_energy(out / "energy.png", recording.columns(), xlabel="path [mm]")
     body = gather_grid(state.u, {"stress": extreme_bending(beam)})
     crack = gather_facets(state.u, beam.crack.points.facets, beam.crack.facet_mean("damage"))
     scale = 4 * beam.specimen.height / opening.max()  # shown four arm heights apart
@@ -361,7 +361,7 @@ def main(
     ) as recording:
         run(beam.mechanics, specimen.turns[-1], control(specimen), recording)
     draw(beam, recording, out, f"Double cantilever beam, {case}, {dim}-D")
-    history = {name: np.asarray(column) for name, column in recording.history.items()}
+    history = recording.columns()
     if history["time"][-1] < specimen.turns[-1]:
         raise typer.Exit(1)  # interrupted: what was recorded stays
     result = growth(specimen, history, specimen.width / beam.share)

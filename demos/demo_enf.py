@@ -288,7 +288,7 @@ def grow(specimen: Specimen, friction: float, out: Path) -> dict[str, np.ndarray
         ) as recording,
     ):
         run(beam.mechanics, specimen.until, control(), recording)
-    history = {name: np.asarray(column) for name, column in recording.history.items()}
+    history = recording.columns()
     draw(beam, history, out, f"End-notched flexure, friction {friction:g}")
     if history["time"][-1] < specimen.until:
         raise typer.Exit(1)  # interrupted: what was recorded stays

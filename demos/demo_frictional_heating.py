@@ -378,7 +378,7 @@ def rub(pair: Pair, name: str, out: Path) -> tuple[Rubbing, dict[str, NDArray[np
         ) as recording,
     ):
         run(problem, until, pair.control, recording)
-    history = {column: np.asarray(values) for column, values in recording.history.items()}
+    history = recording.columns()
     if history["time"][-1] < until:
         raise typer.Exit(1)  # interrupted: what was recorded stays
     return rubbing, history

@@ -374,7 +374,7 @@ def indent(problem: Indentation, out: Path | None = None) -> dict[str, np.ndarra
         ) as recording:
             run(problem.mechanics, 1.0, control, recording)
     draw(problem, out)
-    return {name: np.asarray(column) for name, column in recording.history.items()}
+    return recording.columns()
 
 
 def study(

@@ -141,7 +141,7 @@ def iron(ironing: Ironing, out: Path) -> dict[str, Array]:
     ):
         run(bodies.mechanics, ironing.until, CONTROL, recording)
     draw(bodies, out / "body.png", f"Ironing, {title}")
-    history = {name: np.asarray(column) for name, column in recording.history.items()}
+    history = recording.columns()
     if history["time"][-1] < ironing.until:
         raise typer.Exit(1)  # interrupted: what was recorded stays
     return history

@@ -391,7 +391,7 @@ def draw(beam: Bending, recording: Recording, compliance: float, out: Path) -> N
         ylabel="load per thickness [N/mm]",
         title="Three-point bending",
     )
-    history = {name: np.asarray(values) for name, values in recording.history.items()} | {"deflection": deflection}
+    history = recording.columns() | {"deflection": deflection}
     plot_energy(out / "energy.png", history, x="deflection", xlabel="deflection [mm]")
 
 

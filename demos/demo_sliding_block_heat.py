@@ -351,7 +351,7 @@ def slide(case: Case, name: str, out: Path) -> tuple[Rubbing, dict[str, Array]]:
                 following = next(pictures)
 
         run(problem, case.until, case.control, report)
-    history = {column: np.asarray(values) for column, values in recording.history.items()}
+    history = recording.columns()
     if history["time"][-1] < case.until * (1 - 1e-9):
         raise typer.Exit(1)  # interrupted: what was recorded stays
     return rubbing, history
