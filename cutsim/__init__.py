@@ -1,40 +1,40 @@
 """cutsim: cutting, tearing and blade penetration of soft solids on FEniCSx."""
 
-from cutsim.anisotropic import FungOrthotropic, TransverselyIsotropic
-from cutsim.cohesive import Bilinear, CohesiveLaw, Exponential
-from cutsim.conduction import HeatBody
-from cutsim.contact import PenaltyContact
-from cutsim.contact_heat import AdiabaticTool, ContactHeat
-from cutsim.crack_friction import CrackFriction
-from cutsim.directions import piecewise_direction
-from cutsim.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from cutsim.friction import Coulomb, FrictionLaw, SmoothCoulomb
-from cutsim.heat_loads import Convection, HeatFlux, PrescribedTemperature
-from cutsim.heat_transfer import HeatTransfer
-from cutsim.interface import Crack
-from cutsim.interface_heat import InterfaceHeat
-from cutsim.loads import Pressure, Support, Traction
-from cutsim.materials import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
-from cutsim.mechanics import Mechanics
-from cutsim.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
-from cutsim.pair_heat import PairHeat
-from cutsim.points import Surface
-from cutsim.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
-from cutsim.schemes import GeneralisedAlpha, Newmark
-from cutsim.solid import Solid
-from cutsim.space import cracked_space
-from cutsim.staggered import ThermoMechanics
-from cutsim.state import State
-from cutsim.stepping import StepControl, StepError, StepReport, run
-from cutsim.surface_pair import SurfacePair
-from cutsim.temperature import Temperature
-from cutsim.thermoelastic import ThermoElastic
-from cutsim.tool_contact import ToolContact
-from cutsim.tool_heat import ToolHeat
-from cutsim.tools import Ball, Blade, FlatPunch, Needle, Path, Plane
-from cutsim.triangulated_tool import TriangulatedTool
-from cutsim.triangulation import Triangulation
-from cutsim.viscoelastic import Prony
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.staggered import ThermoMechanics
+from cutsim.analysis.stepping import StepControl, StepError, StepReport, run
+from cutsim.bodies.loads import Pressure, Support, Traction
+from cutsim.bodies.schemes import GeneralisedAlpha, Newmark
+from cutsim.bodies.solid import Solid
+from cutsim.fields.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
+from cutsim.fields.points import Surface
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.conduction import HeatBody
+from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
+from cutsim.heat.interface_heat import InterfaceHeat
+from cutsim.heat.loads import Convection, HeatFlux, PrescribedTemperature
+from cutsim.heat.pair_heat import PairHeat
+from cutsim.heat.tool_heat import ToolHeat
+from cutsim.heat.transfer import HeatTransfer
+from cutsim.interface.cohesive import Bilinear, CohesiveLaw, Exponential
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack import Crack
+from cutsim.interface.crack_friction import CrackFriction
+from cutsim.interface.friction import Coulomb, FrictionLaw, SmoothCoulomb
+from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
+from cutsim.materials.directions import piecewise_direction
+from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
+from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
+from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
+from cutsim.materials.thermoelastic import ThermoElastic
+from cutsim.materials.viscoelastic import Prony
+from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.tools.shapes import Ball, Blade, FlatPunch, Needle, Path, Plane
+from cutsim.tools.tool_contact import ToolContact
+from cutsim.tools.triangulated_tool import TriangulatedTool
+from cutsim.tools.triangulation import Triangulation
 
 __version__ = "0.1.0"
 

@@ -37,11 +37,11 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim import AdiabaticTool, Blade, Exponential, NeoHookean, StepControl, TaggedMesh, read_geo, run
-from cutsim.cutting import BladeCut, ThermalCut, recovered_toughness
-from cutsim.output import interpolate, write_summary
-from cutsim.pictures import draw_body, gather_facets, gather_grid, prism
-from cutsim.plots import Curve, plot_curves, plot_energy
-from cutsim.recording import Recording
+from cutsim.results.output import interpolate, write_summary
+from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism
+from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.recording import Recording
+from cutsim.studies.cutting import BladeCut, ThermalCut, recovered_toughness
 
 MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
 

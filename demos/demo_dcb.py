@@ -61,12 +61,12 @@ from cutsim import (
     read_geo,
     run,
 )
-from cutsim.compat import JIT_OPTIONS, jit_cache
-from cutsim.fracture import CantileverBeams, crack_front, crack_length_correction, plane_modulus
-from cutsim.output import write_summary
-from cutsim.pictures import draw_body, gather_facets, gather_grid
-from cutsim.plots import Curve, plot_curves, plot_energy
-from cutsim.recording import Columns, Recording
+from cutsim.base.compat import JIT_OPTIONS, jit_cache
+from cutsim.results.output import write_summary
+from cutsim.results.pictures import draw_body, gather_facets, gather_grid
+from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.recording import Columns, Recording
+from cutsim.studies.fracture import CantileverBeams, crack_front, crack_length_correction, plane_modulus
 
 MESH = Path(__file__).parents[1] / "meshes" / "dcb.geo"
 COMM = MPI.COMM_WORLD

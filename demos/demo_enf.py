@@ -60,8 +60,12 @@ from cutsim import (
     read_geo,
     run,
 )
-from cutsim.compat import expression
-from cutsim.fracture import (
+from cutsim.base.compat import expression
+from cutsim.results.output import write_summary
+from cutsim.results.pictures import draw_body, gather_facets, gather_grid
+from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.recording import Columns, Recording
+from cutsim.studies.fracture import (
     ENF_CORRECTION,
     EndNotchedBeam,
     JIntegral,
@@ -70,10 +74,6 @@ from cutsim.fracture import (
     energy_release_from_compliance,
     plane_modulus,
 )
-from cutsim.output import write_summary
-from cutsim.pictures import draw_body, gather_facets, gather_grid
-from cutsim.plots import Curve, plot_curves, plot_energy
-from cutsim.recording import Columns, Recording
 
 MESH = Path(__file__).parents[1] / "meshes" / "enf.geo"
 COMM = MPI.COMM_WORLD

@@ -63,12 +63,12 @@ from cutsim import (
     run,
 )
 from cutsim import Path as ToolPath
-from cutsim.compat import expression
-from cutsim.output import write_summary
-from cutsim.pictures import draw_body, gather_grid
-from cutsim.plots import Curve, plot_curves
-from cutsim.points import FacetPoints, Surface, Values
-from cutsim.recording import Columns, Recording
+from cutsim.base.compat import expression
+from cutsim.fields.points import FacetPoints, Surface, Values
+from cutsim.results.output import write_summary
+from cutsim.results.pictures import draw_body, gather_grid
+from cutsim.results.plots import Curve, plot_curves
+from cutsim.results.recording import Columns, Recording
 
 MESHES = Path(__file__).parents[1] / "meshes"
 COMM = MPI.COMM_WORLD

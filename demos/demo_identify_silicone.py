@@ -22,7 +22,6 @@ from mpi4py import MPI
 from scipy.optimize import root_scalar
 
 from cutsim import Blade, Exponential, NeoHookean, StepControl, TaggedMesh, read_geo, run
-from cutsim.cutting import BladeCut
 from cutsim.identify import (
     Fit,
     MaterialFit,
@@ -33,9 +32,10 @@ from cutsim.identify import (
     poisson_ratio,
     read_table,
 )
-from cutsim.library import material
-from cutsim.output import write_summary
-from cutsim.plots import Curve, plot_curves
+from cutsim.materials.library import material
+from cutsim.results.output import write_summary
+from cutsim.results.plots import Curve, plot_curves
+from cutsim.studies.cutting import BladeCut
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 COMM = MPI.COMM_WORLD

@@ -36,11 +36,11 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim import Coulomb, Mechanics, NeoHookean, Solid, State, StepControl, Support, SurfacePair, read_geo, run
-from cutsim.compat import expression
-from cutsim.output import write_summary
-from cutsim.pictures import draw_body, gather_grid
-from cutsim.plots import Curve, plot_curves
-from cutsim.recording import Columns, Recording
+from cutsim.base.compat import expression
+from cutsim.results.output import write_summary
+from cutsim.results.pictures import draw_body, gather_grid
+from cutsim.results.plots import Curve, plot_curves
+from cutsim.results.recording import Columns, Recording
 
 MESH = Path(__file__).parents[1] / "meshes" / "ironing.geo"
 COMM = MPI.COMM_WORLD

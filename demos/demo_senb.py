@@ -40,21 +40,21 @@ from dolfinx import fem
 from dolfinx.mesh import compute_midpoints, locate_entities
 from mpi4py import MPI
 
-from cutsim.cohesive import Exponential
-from cutsim.fracture import BentBeam, JIntegral, energy_release_from_energy, plane_modulus, stress_intensity
-from cutsim.interface import Crack
-from cutsim.loads import Support
-from cutsim.materials import LinearElastic
-from cutsim.mechanics import Mechanics
-from cutsim.meshing import TaggedMesh, read_geo
-from cutsim.output import write_summary
-from cutsim.pictures import draw_body, gather_facets, gather_grid
-from cutsim.plots import Curve, plot_curves, plot_energy
-from cutsim.recording import Recording
-from cutsim.solid import Solid
-from cutsim.space import cracked_space
-from cutsim.state import State
-from cutsim.stepping import StepControl, StepReport, run
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, StepReport, run
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.meshing import TaggedMesh, read_geo
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.interface.cohesive import Exponential
+from cutsim.interface.crack import Crack
+from cutsim.materials.elastic import LinearElastic
+from cutsim.results.output import write_summary
+from cutsim.results.pictures import draw_body, gather_facets, gather_grid
+from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.recording import Recording
+from cutsim.studies.fracture import BentBeam, JIntegral, energy_release_from_energy, plane_modulus, stress_intensity
 
 MESH = Path(__file__).parent.parent / "meshes" / "senb.geo"
 W, S, B, A = 20.0, 80.0, 10.0, 9.0

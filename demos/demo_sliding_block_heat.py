@@ -77,11 +77,11 @@ from cutsim import (
     read_geo,
     run,
 )
-from cutsim.output import interpolate, write_summary
-from cutsim.pictures import draw_body, gather_grid
-from cutsim.plots import Curve, plot_curves
-from cutsim.recording import Columns, Recording
-from cutsim.units import Units
+from cutsim.base.units import Units
+from cutsim.results.output import interpolate, write_summary
+from cutsim.results.pictures import draw_body, gather_grid
+from cutsim.results.plots import Curve, plot_curves
+from cutsim.results.recording import Columns, Recording
 
 MESH = Path(__file__).parents[1] / "meshes" / "sliding.geo"
 COMM = MPI.COMM_WORLD

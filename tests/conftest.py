@@ -6,14 +6,14 @@ import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI
 
-from cutsim.cohesive import Bilinear, Exponential
-from cutsim.interface import Crack
-from cutsim.loads import Support
-from cutsim.materials import LinearElastic
-from cutsim.solid import Solid
-from cutsim.space import cracked_space
-from cutsim.state import State
-from cutsim.stepping import run
+from cutsim.analysis.stepping import run
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.interface.cohesive import Bilinear, Exponential
+from cutsim.interface.crack import Crack
+from cutsim.materials.elastic import LinearElastic
 
 E, NU = 2.0, 0.3
 ELASTIC = LinearElastic(E, NU)

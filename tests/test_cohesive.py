@@ -7,7 +7,7 @@ import pytest
 import ufl
 from conftest import BILINEAR, EXPONENTIAL
 
-from cutsim.cohesive import Bilinear, Exponential, process_zone_element
+from cutsim.interface.cohesive import Bilinear, Exponential, process_zone_element
 
 PAIRS = [
     {"strength": 2.0, "opening": 0.1},

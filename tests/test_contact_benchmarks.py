@@ -11,14 +11,14 @@ from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 from test_sliding import stack
 
-from cutsim.contact import PenaltyContact
-from cutsim.friction import Coulomb
-from cutsim.loads import Support, Traction
-from cutsim.materials import LinearElastic
-from cutsim.mechanics import Mechanics
-from cutsim.solid import Solid
-from cutsim.stepping import StepControl
-from cutsim.surface_pair import SurfacePair
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.bodies.loads import Support, Traction
+from cutsim.bodies.solid import Solid
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import LinearElastic
+from cutsim.pairs.surface_pair import SurfacePair
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from demo_dcb import ISOTROPIC, control

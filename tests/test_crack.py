@@ -6,12 +6,12 @@ import ufl
 from conftest import BILINEAR, EXPONENTIAL, NU, E, history, make_blocks, rotation
 from dolfinx import fem, la
 
-from cutsim.compat import form
-from cutsim.contact import PenaltyContact
-from cutsim.materials import NeoHookean, StVenantKirchhoff
-from cutsim.mechanics import Mechanics
-from cutsim.rubbers import MooneyRivlin
-from cutsim.stepping import StepControl
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.base.compat import form
+from cutsim.interface.contact import PenaltyContact
+from cutsim.materials.elastic import NeoHookean, StVenantKirchhoff
+from cutsim.materials.rubbers import MooneyRivlin
 
 PENALTY = PenaltyContact(500.0)
 

@@ -8,9 +8,9 @@ import pytest
 from mpi4py import MPI
 
 from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
-from cutsim.cohesive import separation_curve
-from cutsim.compat import CACHE_DIR
-from cutsim.cutting import BladeCut, recovered_toughness
+from cutsim.base.compat import CACHE_DIR
+from cutsim.interface.cohesive import separation_curve
+from cutsim.studies.cutting import BladeCut, recovered_toughness
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 TOUGHNESS = 0.2

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim.stepping import run
+from cutsim.analysis.stepping import run
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from demo_dcb import ISOTROPIC, QUICK, THESIS, Beam, control, growth, secants

@@ -11,11 +11,11 @@ import test_tangents
 import test_tools
 from conftest import make_blocks
 
-from cutsim.cohesive import CohesiveLaw
-from cutsim.contact import PenaltyContact
-from cutsim.materials import Material
-from cutsim.points import Surface
-from cutsim.tools import Shape
+from cutsim.fields.points import Surface
+from cutsim.interface.cohesive import CohesiveLaw
+from cutsim.interface.contact import PenaltyContact
+from cutsim.materials.elastic import Material
+from cutsim.tools.shapes import Shape
 
 DOCS = Path(__file__).parents[1] / "docs"
 PYTHON = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)

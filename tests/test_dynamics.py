@@ -10,21 +10,21 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from test_tangents import STEPS, Linearised, smooth
 
-from cutsim.assembly import integrate
-from cutsim.cohesive import Exponential
-from cutsim.compat import form
-from cutsim.contact import PenaltyContact
-from cutsim.friction import Coulomb
-from cutsim.loads import Support, Traction
-from cutsim.materials import LinearElastic, NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.points import Surface
-from cutsim.schemes import GeneralisedAlpha, Newmark
-from cutsim.solid import Solid
-from cutsim.state import State
-from cutsim.stepping import StepControl, run
-from cutsim.tool_contact import ToolContact
-from cutsim.tools import Path, Plane
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.assembly import integrate
+from cutsim.base.compat import form
+from cutsim.bodies.loads import Support, Traction
+from cutsim.bodies.schemes import GeneralisedAlpha, Newmark
+from cutsim.bodies.solid import Solid
+from cutsim.fields.points import Surface
+from cutsim.fields.state import State
+from cutsim.interface.cohesive import Exponential
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import LinearElastic, NeoHookean
+from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.tool_contact import ToolContact
 
 E, RHO, LENGTH, CELLS = 3.0, 2.0, 4.0, 8
 AMPLITUDE = 0.01

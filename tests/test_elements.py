@@ -12,28 +12,28 @@ from scipy.optimize import brentq
 from test_sliding import Stack, stack
 from test_tangents import assert_slope_two, jump_part, smooth
 
-from cutsim.assembly import integrate
-from cutsim.compat import form
-from cutsim.conduction import HeatBody
-from cutsim.contact import PenaltyContact
-from cutsim.fracture import JIntegral
-from cutsim.friction import Coulomb
-from cutsim.heat_loads import HeatFlux, PrescribedTemperature
-from cutsim.heat_transfer import HeatTransfer
-from cutsim.interface import Crack
-from cutsim.loads import Pressure, Support, Traction
-from cutsim.materials import IsochoricNeoHookean, LinearElastic, NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.points import Surface
-from cutsim.rubbers import MooneyRivlin
-from cutsim.solid import Solid
-from cutsim.space import cracked_space
-from cutsim.state import State
-from cutsim.stepping import StepControl, run
-from cutsim.temperature import Temperature
-from cutsim.tool_contact import ToolContact
-from cutsim.tools import Ball, Needle, Path
-from cutsim.viscoelastic import Prony
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.assembly import integrate
+from cutsim.base.compat import form
+from cutsim.bodies.loads import Pressure, Support, Traction
+from cutsim.bodies.solid import Solid
+from cutsim.fields.points import Surface
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.conduction import HeatBody
+from cutsim.heat.loads import HeatFlux, PrescribedTemperature
+from cutsim.heat.transfer import HeatTransfer
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack import Crack
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean
+from cutsim.materials.rubbers import MooneyRivlin
+from cutsim.materials.viscoelastic import Prony
+from cutsim.studies.fracture import JIntegral
+from cutsim.tools.shapes import Ball, Needle, Path
+from cutsim.tools.tool_contact import ToolContact
 
 E = 2.0
 QUAD, TRIANGLE = mesh.CellType.quadrilateral, mesh.CellType.triangle

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from conftest import EXPONENTIAL, NU, E, history, make_blocks
 
-from cutsim.cohesive import Exponential
-from cutsim.contact import PenaltyContact
-from cutsim.energy import EnergyAudit
-from cutsim.loads import Support
-from cutsim.materials import NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.stepping import StepControl
-from cutsim.terms import ENTRIES
+from cutsim.analysis.energy import EnergyAudit
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.base.terms import ENTRIES
+from cutsim.bodies.loads import Support
+from cutsim.interface.cohesive import Exponential
+from cutsim.interface.contact import PenaltyContact
+from cutsim.materials.elastic import NeoHookean
 
 DISSIPATED = ("fracture", "friction", "viscous")
 WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)

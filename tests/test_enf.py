@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim.fracture import EndNotchedBeam, crack_profile
-from cutsim.meshing import read_geo
-from cutsim.stepping import run
+from cutsim.analysis.stepping import run
+from cutsim.fields.meshing import read_geo
+from cutsim.studies.fracture import EndNotchedBeam, crack_profile
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from demo_enf import MESH, QUICK, Beam, before_growth, control, growth

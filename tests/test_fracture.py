@@ -6,9 +6,16 @@ from dolfinx import mesh
 from dolfinx.mesh import CellType, GhostMode
 from mpi4py import MPI
 
-from cutsim.assembly import integrate
-from cutsim.compat import form
-from cutsim.fracture import (
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.assembly import integrate
+from cutsim.base.compat import form
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.materials.elastic import LinearElastic, NeoHookean
+from cutsim.studies.fracture import (
     BentBeam,
     CantileverBeams,
     JIntegral,
@@ -18,13 +25,6 @@ from cutsim.fracture import (
     plane_modulus,
     stress_intensity,
 )
-from cutsim.loads import Support
-from cutsim.materials import LinearElastic, NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.solid import Solid
-from cutsim.space import cracked_space
-from cutsim.state import State
-from cutsim.stepping import StepControl, run
 
 PARTITIONER = mesh.create_cell_partitioner(GhostMode.shared_facet)
 

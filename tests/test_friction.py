@@ -6,17 +6,17 @@ from conftest import EXPONENTIAL, E, history, make_blocks, rotation
 from dolfinx import fem
 from mpi4py import MPI
 
-from cutsim.contact import PenaltyContact
-from cutsim.crack_friction import CrackFriction
-from cutsim.friction import Coulomb, SmoothCoulomb
-from cutsim.loads import Support
-from cutsim.materials import LinearElastic
-from cutsim.mechanics import Mechanics
-from cutsim.points import Surface
-from cutsim.space import cracked_space
-from cutsim.stepping import StepControl, run
-from cutsim.tool_contact import ToolContact
-from cutsim.tools import Path, Plane
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.bodies.loads import Support
+from cutsim.fields.points import Surface
+from cutsim.fields.space import cracked_space
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack_friction import CrackFriction
+from cutsim.interface.friction import Coulomb, SmoothCoulomb
+from cutsim.materials.elastic import LinearElastic
+from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.tool_contact import ToolContact
 
 MU, NORMAL, TANGENTIAL = 0.3, 50.0, 40.0
 DEPTH = 0.02

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim.contact_heat import ContactHeat
-from cutsim.friction import Coulomb
-from cutsim.meshing import read_geo
-from cutsim.sizes import facet_size, global_range, normal_size
-from cutsim.stepping import StepControl, run
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.fields.meshing import read_geo
+from cutsim.fields.sizes import facet_size, global_range, normal_size
+from cutsim.heat.contact_heat import ContactHeat
+from cutsim.interface.friction import Coulomb
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from demo_frictional_heating import (

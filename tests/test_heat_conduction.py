@@ -6,14 +6,14 @@ from conftest import history, make_blocks, slopes
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from cutsim.conduction import HeatBody
-from cutsim.heat_loads import Convection, HeatFlux, PrescribedTemperature
-from cutsim.heat_transfer import HeatTransfer
-from cutsim.materials import NeoHookean
-from cutsim.solid import Solid
-from cutsim.state import State
-from cutsim.stepping import StepControl, run
-from cutsim.temperature import Temperature
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.conduction import HeatBody
+from cutsim.heat.loads import Convection, HeatFlux, PrescribedTemperature
+from cutsim.heat.transfer import HeatTransfer
+from cutsim.materials.elastic import NeoHookean
 
 RHO, C, K = 2.0, 3.0, 0.5
 BODY = {"density": RHO, "capacity": C, "conductivity": K}

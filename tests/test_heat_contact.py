@@ -7,22 +7,22 @@ from dolfinx import fem
 from mpi4py import MPI
 from scipy.linalg import expm
 
-from cutsim.conduction import HeatBody
-from cutsim.contact import PenaltyContact
-from cutsim.contact_heat import AdiabaticTool, ContactHeat
-from cutsim.friction import Coulomb
-from cutsim.heat_loads import PrescribedTemperature
-from cutsim.heat_transfer import HeatTransfer
-from cutsim.interface_heat import InterfaceHeat
-from cutsim.mechanics import Mechanics
-from cutsim.points import Surface
-from cutsim.space import cracked_space
-from cutsim.staggered import ThermoMechanics
-from cutsim.stepping import StepControl
-from cutsim.temperature import Temperature
-from cutsim.tool_contact import ToolContact
-from cutsim.tool_heat import ToolHeat
-from cutsim.tools import Path, Plane
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.staggered import ThermoMechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.fields.points import Surface
+from cutsim.fields.space import cracked_space
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.conduction import HeatBody
+from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
+from cutsim.heat.interface_heat import InterfaceHeat
+from cutsim.heat.loads import PrescribedTemperature
+from cutsim.heat.tool_heat import ToolHeat
+from cutsim.heat.transfer import HeatTransfer
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import Coulomb
+from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.tool_contact import ToolContact
 
 STIFFNESS, DEPTH = 10.0, 0.02
 PRESSURE = STIFFNESS * DEPTH

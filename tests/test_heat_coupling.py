@@ -9,27 +9,27 @@ from scipy.optimize import brentq
 from test_output import written
 from test_tangents import assert_slope_two, smooth
 
-from cutsim.cohesive import Exponential
-from cutsim.conduction import HeatBody
-from cutsim.contact import PenaltyContact
-from cutsim.contact_heat import ContactHeat
-from cutsim.crack_friction import CrackFriction
-from cutsim.friction import Coulomb
-from cutsim.heat_loads import Convection, PrescribedTemperature
-from cutsim.heat_transfer import HeatTransfer
-from cutsim.interface_heat import InterfaceHeat
-from cutsim.loads import Support
-from cutsim.materials import LinearElastic, NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.output import read_history
-from cutsim.recording import Recording
-from cutsim.solid import Solid
-from cutsim.space import cracked_space
-from cutsim.staggered import ThermoMechanics
-from cutsim.state import State
-from cutsim.stepping import StepControl, run
-from cutsim.temperature import Temperature
-from cutsim.thermoelastic import ThermoElastic
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.staggered import ThermoMechanics
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.conduction import HeatBody
+from cutsim.heat.contact_heat import ContactHeat
+from cutsim.heat.interface_heat import InterfaceHeat
+from cutsim.heat.loads import Convection, PrescribedTemperature
+from cutsim.heat.transfer import HeatTransfer
+from cutsim.interface.cohesive import Exponential
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack_friction import CrackFriction
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import LinearElastic, NeoHookean
+from cutsim.materials.thermoelastic import ThermoElastic
+from cutsim.results.output import read_history
+from cutsim.results.recording import Recording
 
 G, LAME = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)
 ALPHA, RISE = 1e-3, 100.0

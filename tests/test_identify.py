@@ -11,8 +11,8 @@ from test_materials import ISOTROPIC, energy, name
 from test_materials_closed_forms import PATHS, incompressible, nominal
 
 from cutsim import IsochoricNeoHookean, LinearElastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
-from cutsim.fibres import DispersedFibres, Reinforced
-from cutsim.fitting import fit_model
+from cutsim.base.parameters import numbers, substituted, with_numbers
+from cutsim.base.units import Units
 from cutsim.identify import (
     StressTest,
     converted,
@@ -25,11 +25,11 @@ from cutsim.identify import (
     read_table,
     unstable_stretches,
 )
-from cutsim.indentation import _layer_factor
-from cutsim.library import material
-from cutsim.parameters import numbers, substituted, with_numbers
-from cutsim.response import Response
-from cutsim.units import Units
+from cutsim.identify.fitting import fit_model
+from cutsim.identify.indentation import _layer_factor
+from cutsim.identify.response import Response
+from cutsim.materials.fibres import DispersedFibres, Reinforced
+from cutsim.materials.library import material
 
 # -- numbers of a law -------------------------------------------------------------------------------------------------
 

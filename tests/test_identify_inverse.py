@@ -10,9 +10,9 @@ import pytest
 from mpi4py import MPI
 
 from cutsim import Blade, Exponential, NeoHookean, StepControl, StepError, read_geo, run
-from cutsim.cutting import BladeCut
 from cutsim.identify import fit_simulation
-from cutsim.inverse import Evaluations
+from cutsim.identify.inverse import Evaluations
+from cutsim.studies.cutting import BladeCut
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 TRUE = {"stiffness": 2.0, "decay": 0.5}

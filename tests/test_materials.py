@@ -9,19 +9,19 @@ from conftest import NU, E, history, make_blocks, rotation
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from cutsim.anisotropic import FungOrthotropic, TransverselyIsotropic
-from cutsim.assembly import integrate
-from cutsim.compat import expression as compiled
-from cutsim.compat import form
-from cutsim.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from cutsim.loads import Support, Traction
-from cutsim.materials import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
-from cutsim.mechanics import Mechanics
-from cutsim.parameters import with_constants
-from cutsim.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
-from cutsim.solid import Solid
-from cutsim.state import State
-from cutsim.stepping import StepControl
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.base.assembly import integrate
+from cutsim.base.compat import expression as compiled
+from cutsim.base.compat import form
+from cutsim.base.parameters import with_constants
+from cutsim.bodies.loads import Support, Traction
+from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
+from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
+from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
+from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
+from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 
 MOONEY = MooneyRivlin(0.3, 0.1, 4.0)
 TWO_CONSTANTS = [kind(E, NU) for kind in (NeoHookean, StVenantKirchhoff, LinearElastic)]

@@ -9,16 +9,16 @@ from mpi4py import MPI
 from test_materials import AXIS, F0, MOONEY, cube_between_plates, energy, name, response, rotation, stress
 from test_tangents import assert_slope_two, smooth
 
-from cutsim.anisotropic import FungOrthotropic, TransverselyIsotropic
-from cutsim.assembly import integrate
-from cutsim.compat import expression, form
-from cutsim.directions import piecewise_direction
-from cutsim.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from cutsim.materials import IsochoricNeoHookean, NeoHookean
-from cutsim.parameters import with_constants
-from cutsim.rubbers import ArrudaBoyce, Ogden, Yeoh
-from cutsim.stepping import StepControl, run
-from cutsim.stretches import stretch_power_sums
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.assembly import integrate
+from cutsim.base.compat import expression, form
+from cutsim.base.parameters import with_constants
+from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
+from cutsim.materials.directions import piecewise_direction
+from cutsim.materials.elastic import IsochoricNeoHookean, NeoHookean
+from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
+from cutsim.materials.rubbers import ArrudaBoyce, Ogden, Yeoh
+from cutsim.materials.stretches import stretch_power_sums
 
 STRETCHES = [0.5, 0.9, 1.0, 1.001, 1.4, 2.5]
 # W'(I₁) of energies in the first invariant, and W'(I₂)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from test_materials import energy, stress
 
-from cutsim.library import LIBRARY, material
-from cutsim.materials import Material
-from cutsim.rubbers import Ogden
+from cutsim.materials.elastic import Material
+from cutsim.materials.library import LIBRARY, material
+from cutsim.materials.rubbers import Ogden
 
 
 @pytest.mark.parametrize("name", LIBRARY)

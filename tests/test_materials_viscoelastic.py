@@ -10,17 +10,17 @@ from scipy.integrate import quad
 from test_materials import AXIS, MOONEY, name, stress
 from test_tangents import assert_slope_two, smooth
 
-from cutsim.assembly import nodal_forces
-from cutsim.compat import form
-from cutsim.fibres import DispersedFibres, Reinforced
-from cutsim.loads import Support
-from cutsim.materials import IsochoricNeoHookean, NeoHookean, StVenantKirchhoff
-from cutsim.mechanics import Mechanics
-from cutsim.rubbers import Ogden
-from cutsim.solid import Solid
-from cutsim.state import State
-from cutsim.stepping import StepControl
-from cutsim.viscoelastic import Prony
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.base.assembly import nodal_forces
+from cutsim.base.compat import form
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
+from cutsim.materials.elastic import IsochoricNeoHookean, NeoHookean, StVenantKirchhoff
+from cutsim.materials.fibres import DispersedFibres, Reinforced
+from cutsim.materials.rubbers import Ogden
+from cutsim.materials.viscoelastic import Prony
 
 PRONY = Prony((0.5, 0.8), (0.3, 2.0))
 SVK = StVenantKirchhoff(E, NU)

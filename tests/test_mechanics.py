@@ -7,20 +7,20 @@ from conftest import NU, E, history, make_blocks
 from dolfinx import mesh
 from mpi4py import MPI
 
-from cutsim.assembly import integrate
-from cutsim.cohesive import Exponential
-from cutsim.compat import form
-from cutsim.contact import PenaltyContact
-from cutsim.friction import SmoothCoulomb
-from cutsim.interface import Crack
-from cutsim.loads import Support, Traction
-from cutsim.materials import NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.points import Surface
-from cutsim.recording import Recording
-from cutsim.stepping import StepControl, run
-from cutsim.tool_contact import ToolContact
-from cutsim.tools import Ball, Path
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.assembly import integrate
+from cutsim.base.compat import form
+from cutsim.bodies.loads import Support, Traction
+from cutsim.fields.points import Surface
+from cutsim.interface.cohesive import Exponential
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack import Crack
+from cutsim.interface.friction import SmoothCoulomb
+from cutsim.materials.elastic import NeoHookean
+from cutsim.results.recording import Recording
+from cutsim.tools.shapes import Ball, Path
+from cutsim.tools.tool_contact import ToolContact
 
 WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 

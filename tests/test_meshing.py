@@ -11,8 +11,8 @@ from dolfinx import fem
 from dolfinx.mesh import CellType, GhostMode
 from mpi4py import MPI
 
-from cutsim.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
-from cutsim.sizes import facet_size, global_range, normal_size
+from cutsim.fields.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
+from cutsim.fields.sizes import facet_size, global_range, normal_size
 
 MESHES = Path(__file__).parents[1] / "meshes"
 COMM = MPI.COMM_WORLD

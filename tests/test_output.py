@@ -16,10 +16,10 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from rich.console import Console
 
-from cutsim.output import FieldWriter, HistoryWriter, read_history, write_summary
-from cutsim.progress import Progress
-from cutsim.space import cracked_space
-from cutsim.units import KINDS, Units
+from cutsim.base.units import KINDS, Units
+from cutsim.fields.space import cracked_space
+from cutsim.results.output import FieldWriter, HistoryWriter, read_history, write_summary
+from cutsim.results.progress import Progress
 
 COLUMNS = {"step": "one", "time": "time", "depth": "length", "force_y": "force"}
 
@@ -223,7 +223,7 @@ def test_progress_lets_errors_and_interrupts_pass(terminal, monkeypatch):
 
 def test_sigint_reaches_a_run_with_progress():
     program = (
-        "import os, signal\nfrom mpi4py import MPI\nfrom cutsim.progress import Progress\n"
+        "import os, signal\nfrom mpi4py import MPI\nfrom cutsim.results.progress import Progress\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # background jobs start with it ignored
         "with Progress(1.0, MPI.COMM_WORLD) as p:\n"
         "    p.update(0.5)\n    os.kill(os.getpid(), signal.SIGINT)\n    p.update(0.7)\n"

@@ -8,20 +8,20 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from test_sliding import LINE_SEARCHES, E, stack, two
 
-from cutsim.conduction import HeatBody
-from cutsim.contact import PenaltyContact
-from cutsim.contact_heat import ContactHeat
-from cutsim.friction import Coulomb
-from cutsim.heat_loads import PrescribedTemperature
-from cutsim.heat_transfer import HeatTransfer
-from cutsim.loads import Support
-from cutsim.materials import NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.pair_heat import PairHeat
-from cutsim.solid import Solid
-from cutsim.staggered import ThermoMechanics
-from cutsim.stepping import StepControl
-from cutsim.temperature import Temperature
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.staggered import ThermoMechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.conduction import HeatBody
+from cutsim.heat.contact_heat import ContactHeat
+from cutsim.heat.loads import PrescribedTemperature
+from cutsim.heat.pair_heat import PairHeat
+from cutsim.heat.transfer import HeatTransfer
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import NeoHookean
 
 STIFFNESS, DEPTH = 1000.0, 0.02
 PRESSURE = STIFFNESS * DEPTH

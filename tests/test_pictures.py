@@ -12,9 +12,9 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from cutsim import pictures, plots
-from cutsim.pictures import draw_body, gather_facets, gather_grid
-from cutsim.plots import Curve, plot_curves, plot_energy
-from cutsim.space import cracked_space
+from cutsim.fields.space import cracked_space
+from cutsim.results.pictures import draw_body, gather_facets, gather_grid
+from cutsim.results.plots import Curve, plot_curves, plot_energy
 
 SHAPES = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim.fracture import BentBeam
-from cutsim.output import read_history
-from cutsim.stepping import StepControl, run
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.results.output import read_history
+from cutsim.studies.fracture import BentBeam
 
 SCRIPT = Path(__file__).parent.parent / "demos" / "demo_senb.py"
 

@@ -10,15 +10,15 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from cutsim.contact import PenaltyContact
-from cutsim.friction import Coulomb
-from cutsim.loads import Support
-from cutsim.materials import LinearElastic, NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.solid import Solid
-from cutsim.state import State
-from cutsim.stepping import StepControl
-from cutsim.surface_pair import SurfacePair
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import LinearElastic, NeoHookean
+from cutsim.pairs.surface_pair import SurfacePair
 
 E = 2.0
 KINDS = {

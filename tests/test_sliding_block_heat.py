@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim.meshing import read_geo
-from cutsim.stepping import run
+from cutsim.analysis.stepping import run
+from cutsim.fields.meshing import read_geo
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from demo_sliding_block_heat import (

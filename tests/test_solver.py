@@ -8,11 +8,11 @@ from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from cutsim import preconditioners
-from cutsim.compat import jit_cache
-from cutsim.preconditioners import fallback_for, preset_for, rigid_body_modes
-from cutsim.solver import NonlinearProblem
-from cutsim.space import cracked_space
+from cutsim.base.compat import jit_cache
+from cutsim.fields.space import cracked_space
+from cutsim.solvers import preconditioners
+from cutsim.solvers.newton import NonlinearProblem
+from cutsim.solvers.preconditioners import fallback_for, preset_for, rigid_body_modes
 
 WORLD = MPI.COMM_WORLD
 E, NU = 1.0, 0.3

@@ -9,7 +9,7 @@ from dolfinx.fem.petsc import LinearProblem, assemble_matrix
 from dolfinx.io import VTXWriter
 from mpi4py import MPI
 
-from cutsim.space import crack_measure_entities, cracked_space, locate_dofs
+from cutsim.fields.space import crack_measure_entities, cracked_space, locate_dofs
 
 WORLD = MPI.COMM_WORLD
 TRIANGLE, QUADRILATERAL = mesh.CellType.triangle, mesh.CellType.quadrilateral

@@ -8,18 +8,18 @@ import ufl
 from conftest import EXPONENTIAL, NU, E, history, make_blocks
 from mpi4py import MPI
 
-from cutsim.cohesive import Exponential
-from cutsim.contact import PenaltyContact
-from cutsim.friction import SmoothCoulomb
-from cutsim.loads import Support, Traction
-from cutsim.materials import NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.output import read_history
-from cutsim.points import Surface
-from cutsim.recording import Recording
-from cutsim.stepping import StepControl, StepError, run
-from cutsim.tool_contact import ToolContact
-from cutsim.tools import Path, Plane
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, StepError, run
+from cutsim.bodies.loads import Support, Traction
+from cutsim.fields.points import Surface
+from cutsim.interface.cohesive import Exponential
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import SmoothCoulomb
+from cutsim.materials.elastic import NeoHookean
+from cutsim.results.output import read_history
+from cutsim.results.recording import Recording
+from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.tool_contact import ToolContact
 
 WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 

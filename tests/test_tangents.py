@@ -9,15 +9,15 @@ from conftest import BILINEAR, EXPONENTIAL, NU, E, make_blocks, slopes
 from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_matrix
 
-from cutsim.compat import form
-from cutsim.contact import PenaltyContact
-from cutsim.crack_friction import CrackFriction
-from cutsim.friction import Coulomb, SmoothCoulomb
-from cutsim.materials import LinearElastic, NeoHookean, StVenantKirchhoff
-from cutsim.points import Surface
-from cutsim.rubbers import MooneyRivlin
-from cutsim.tool_contact import ToolContact
-from cutsim.tools import Ball, Blade, FlatPunch, Needle, Path, Plane
+from cutsim.base.compat import form
+from cutsim.fields.points import Surface
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack_friction import CrackFriction
+from cutsim.interface.friction import Coulomb, SmoothCoulomb
+from cutsim.materials.elastic import LinearElastic, NeoHookean, StVenantKirchhoff
+from cutsim.materials.rubbers import MooneyRivlin
+from cutsim.tools.shapes import Ball, Blade, FlatPunch, Needle, Path, Plane
+from cutsim.tools.tool_contact import ToolContact
 
 STEPS = np.array([1e-2, 5e-3, 2.5e-3])
 

@@ -5,18 +5,18 @@ import pytest
 from conftest import NU, E, history, make_blocks
 from dolfinx import fem
 
-from cutsim.assembly import moment
-from cutsim.contact import PenaltyContact
-from cutsim.friction import SmoothCoulomb
-from cutsim.loads import Support
-from cutsim.materials import NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.points import Surface
-from cutsim.solid import Solid
-from cutsim.state import State
-from cutsim.stepping import StepControl
-from cutsim.tool_contact import ToolContact, warn_coarse
-from cutsim.tools import Ball, Blade, Path, Plane
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.base.assembly import moment
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.points import Surface
+from cutsim.fields.state import State
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import SmoothCoulomb
+from cutsim.materials.elastic import NeoHookean
+from cutsim.tools.shapes import Ball, Blade, Path, Plane
+from cutsim.tools.tool_contact import ToolContact, warn_coarse
 
 CONTACT = PenaltyContact(60.0, blend=0.01)
 FRICTION = SmoothCoulomb(0.3, 1e-3)

@@ -9,20 +9,20 @@ from dolfinx import fem
 from mpi4py import MPI
 from test_sliding import LINE_SEARCHES, STEPS, Assembled, wavy
 
-from cutsim.assembly import moment
-from cutsim.contact import PenaltyContact
-from cutsim.friction import Coulomb
-from cutsim.loads import Support
-from cutsim.materials import NeoHookean
-from cutsim.mechanics import Mechanics
-from cutsim.points import Surface
-from cutsim.solid import Solid
-from cutsim.state import State
-from cutsim.stepping import StepControl
-from cutsim.tool_contact import ToolContact
-from cutsim.tools import Ball, Blade, Path
-from cutsim.triangulated_tool import TriangulatedTool
-from cutsim.triangulation import Triangulation
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.base.assembly import moment
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.points import Surface
+from cutsim.fields.state import State
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import NeoHookean
+from cutsim.tools.shapes import Ball, Blade, Path
+from cutsim.tools.tool_contact import ToolContact
+from cutsim.tools.triangulated_tool import TriangulatedTool
+from cutsim.tools.triangulation import Triangulation
 
 R, MU = 0.35, 0.3
 CONTACT, FRICTION = PenaltyContact(60.0), Coulomb(MU)

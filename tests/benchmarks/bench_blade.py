@@ -11,7 +11,7 @@ from common import measure
 from mpi4py import MPI
 
 from cutsim import Blade, Exponential, NeoHookean, StepControl, StepReport, read_geo, run
-from cutsim.cutting import BladeCut
+from cutsim.studies.cutting import BladeCut
 
 MESH = Path(__file__).parents[2] / "meshes" / "block.geo"
 BLOCK = {"dim": 2, "Lx": 10.0, "H": 6.0, "lc": 0.05, "band": 0.4, "notch": 0.5}

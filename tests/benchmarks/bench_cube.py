@@ -12,7 +12,7 @@ from common import Usage, measure
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from cutsim.solver import NonlinearProblem
+from cutsim.solvers.newton import NonlinearProblem
 
 EDGE, LIFT, STEPS = 10.0, 5.0, 10
 E, NU = 1.0, 0.45

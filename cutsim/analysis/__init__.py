@@ -1,0 +1,1 @@
+"""The sum of the terms, the energy audit, and the loop over steps."""

@@ -1,0 +1,59 @@
+"""The energy audit: external work against what became of it (docs/theory.md §6)."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from cutsim.base.terms import ENTRIES
+
+
+@dataclass(frozen=True)
+class EnergyAudit:
+    """Energies since the start of a run [energy].
+
+    External work is summed from reactions and loads (trapezoidal rule); stored energies are functions of the state;
+    dissipated ones are summed from the tractions of the residual.  They are computed independently of each other, so
+    that their difference says how well the steps resolve the process.
+
+    Attributes:
+        external: Work of supports, loads and tools.
+        initial: Energy at the start, such as that of an initial velocity.
+        entries: The other side, `cutsim.base.terms.ENTRIES`; an entry to which no term contributes stays zero.
+        scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with
+            (`cutsim.analysis.mechanics` takes the energy that breaks one facet, the least a cracked mesh can resolve).
+    """
+
+    external: float = 0.0
+    initial: float = 0.0
+    entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(ENTRIES, 0.0))
+    scale: float = 0.0
+
+    def start(self, energies: Iterable[Mapping[str, float]]) -> "EnergyAudit":
+        """Audit of a state that starts with energy; arguments as `advance`."""
+        audit = self.advance(0.0, energies)
+        return replace(audit, initial=sum(audit.entries.values()))
+
+    def advance(self, work: float, energies: Iterable[Mapping[str, float]]) -> "EnergyAudit":
+        """Audit after a step.
+
+        Args:
+            work: External work of the step.
+            energies: Contributions of the terms, totals since the start.
+        """
+        entries = dict.fromkeys(ENTRIES, 0.0)
+        for contribution in energies:
+            for name, value in contribution.items():
+                entries[name] += value
+        external = self.external + work
+        turnover = max(abs(external), sum(abs(v) for v in entries.values()))
+        return replace(self, external=external, entries=entries, scale=max(self.scale, turnover))
+
+    @property
+    def closure(self) -> float:
+        """(initial energy + external work − sum of the entries) / largest turnover so far [–]."""
+        return (self.initial + self.external - sum(self.entries.values())) / self.scale if self.scale > 0 else 0.0
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity)."""
+        columns = {"work_external": (self.external, "energy"), "energy_initial": (self.initial, "energy")}
+        columns |= {f"energy_{name}": (value, "energy") for name, value in self.entries.items()}
+        return columns | {"energy_closure": (self.closure, "one")}

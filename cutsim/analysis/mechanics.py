@@ -1,0 +1,227 @@
+"""The mechanical problem of one step: adds the terms up, derives the tangent, keeps the books of a trial step."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import chain, count
+from typing import Any, Literal
+
+import numpy as np
+import ufl
+from dolfinx import cpp, la
+from numpy.typing import NDArray
+
+from cutsim.analysis.energy import EnergyAudit
+from cutsim.base.assembly import global_dot
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
+from cutsim.base.terms import Term
+from cutsim.bodies.inertia import Inertia
+from cutsim.bodies.loads import Support
+from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
+from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
+from cutsim.interface.crack import Crack
+from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.solvers.newton import NonlinearProblem, Outcome
+
+#: Uzawa augmentations allowed in one step.
+AUGMENTATIONS = 30
+
+# problems that live in one process must not share PETSc options
+_prefixes = chain(["cut_"], (f"cut{n}_" for n in count(2)))
+
+
+class Mechanics:
+    """Equilibrium or motion of solids, cracks, tools and loads.
+
+    Args:
+        state: Displacement and time.
+        terms: Terms of the virtual work.
+        supports: Prescribed displacements.
+        analysis: "quasi-static" or "dynamic"; the latter adds the inertia of the solids, each of which needs a density.
+        scheme: Time integration of a dynamic analysis; the trapezoidal rule by default.
+        mass: "consistent" or "lumped", see `cutsim.bodies.inertia`.
+        petsc_options: PETSc options without prefix; they win over the presets.
+        petsc_options_prefix: Prefix of all PETSc options of the problem, no other's; by default "cut_" for the first
+            problem of a process, then "cut2_" and so on.
+        rtol: Residual tolerance relative to the reactions.
+
+    Attributes:
+        inertia: Velocity, acceleration and momentum; None if quasi-static.
+
+    Raises:
+        ValueError: There is no term, two terms or supports share a name, or a dynamic analysis has no solid or one
+            without density.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        terms: Sequence[Term],
+        supports: Sequence[Support] = (),
+        *,
+        analysis: Literal["quasi-static", "dynamic"] = "quasi-static",
+        scheme: Scheme = TRAPEZOIDAL,
+        mass: Literal["consistent", "lumped"] = "consistent",
+        petsc_options: Mapping[str, Any] | None = None,
+        petsc_options_prefix: str | None = None,
+        rtol: float = 1e-8,
+    ) -> None:
+        names = [t.name for t in terms] + [s.name for s in supports if s.name]
+        require("terms", len(terms), len(terms) > 0, "at least one term")
+        require("names", names, len(set(names)) == len(names), "different for all terms and supports")
+        require("analysis", analysis, analysis in ("quasi-static", "dynamic"), "'quasi-static' or 'dynamic'")
+        self.state, self._static, self.supports = state, tuple(terms), tuple(supports)
+        solids = [t for t in terms if isinstance(t, Solid)]
+        self.inertia = Inertia(state, solids, scheme, mass) if analysis == "dynamic" else None
+        self.terms: tuple[Term, ...] = self._static if self.inertia is None else (*terms, self.inertia)
+        self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
+        v = ufl.TestFunction(state.V)
+        interfaces = [t for t in terms if isinstance(t, Crack | SurfacePair)]
+        self.problem = NonlinearProblem(
+            sum((t.residual(v) for t in self.terms), start=ufl.Form([])),
+            state.u,
+            bcs=[s.bc for s in supports],
+            entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
+            symmetric=all(t.symmetric for t in terms),
+            inertia=self.inertia is not None,
+            terms=[t for t in terms if t.assembles],
+            interface_dofs=self._interface_nodes(interfaces) if interfaces else None,
+            petsc_options=petsc_options,
+            petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
+            rtol=rtol,
+        )
+        self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
+        self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
+        self._residual_old: NDArray[np.float64] = self._residual
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """Fields beside the displacement for output, by name: the velocity of a dynamic analysis."""
+        return {} if self.inertia is None else {"velocity": self.inertia.velocity}
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which a path, load or prescribed velocity has a kink."""
+        return tuple(sorted({c for part in self._parts for c in part.corners}))
+
+    def begin(self, time: float) -> None:
+        """Start a trial step that ends at `time`. Collective.
+
+        Constants move. The displacement stays, or with inertia goes on at the present velocity.
+        """
+        if self.inertia is not None and not self.inertia.started:
+            self._start(self.inertia, time)
+        self.state.begin(time)
+        for part in self._parts:
+            part.begin(time)
+        if self.inertia is not None:
+            self.problem.known[:] = self.inertia.history(self._residual_old)
+
+    def _start(self, inertia: Inertia, end: float) -> None:
+        """Motion, forces and energies at the start of a dynamic analysis whose first step ends at a time."""
+        for term in self._static:
+            term.evaluate()
+            term.commit()
+        for support in self.supports:
+            inertia.prescribe(support.dofs, *support.rates(self.state.time, end))
+        static = self._out_of_balance()
+        self._residual = self._residual_old = inertia.start(static, self.problem.bcs, self.problem.fixed)
+        self.audit = self._trial_audit = self.audit.start([t.energies() for t in self.terms])
+
+    def _out_of_balance(self) -> NDArray[np.float64]:
+        residual = self.problem.residual()
+        forces = residual.array_r.copy()
+        residual.destroy()
+        return forces
+
+    def solve(self, line_search: str | None = None) -> Outcome:
+        """Find equilibrium, with contact augmentations. Collective.
+
+        Args:
+            line_search: "l2", "bt" or "basic"; the solver's default if None.
+        """
+        outcome = self.problem.solve(line_search)
+        for _ in range(AUGMENTATIONS):
+            # every term takes part: a list, because any() would stop at the first
+            if not outcome.converged or not any([t.augment() for t in self.terms]):
+                break
+            again = self.problem.solve(line_search)
+            outcome = replace(
+                again,
+                iterations=outcome.iterations + again.iterations,
+                linear_iterations=outcome.linear_iterations + again.linear_iterations,
+            )
+        else:
+            message = f"contact not settled by {AUGMENTATIONS} augmentations"
+            outcome = replace(outcome, converged=False, message=message)
+        return outcome
+
+    def evaluate(self) -> None:
+        """Trial history, energies and reactions of the converged trial state. Collective."""
+        for term in self.terms:
+            term.evaluate()
+        fixed = self.problem.fixed
+        self._residual = self._out_of_balance()
+        if self.inertia is not None:
+            self._residual = self.inertia.balance(self._residual, self._residual_old, ~fixed)
+        mean = 0.5 * (self._residual + self._residual_old)
+        work = global_dot(self.state.mesh.comm, mean[fixed], self.state.increment[fixed])
+        work += sum(t.external_work() for t in self.terms)
+        self._trial_audit = self.audit.advance(work, [t.energies() for t in self.terms])
+
+    @property
+    def trial_audit(self) -> EnergyAudit:
+        """Energy audit including the trial step."""
+        return self._trial_audit
+
+    def damage_increment(self) -> float:
+        """Largest growth of damage at a point in the trial step. Collective."""
+        return max(t.damage_increment() for t in self.terms)
+
+    def diagnose(self) -> str:
+        """After a failed solve: what is wrong and where, in words. Collective."""
+        return "; ".join(words for t in self.terms if (words := t.diagnose()))
+
+    def reaction(self, support: Support) -> float:
+        """Reaction of a support along its component in the trial state [force]. Collective."""
+        return support.reaction(self._residual)
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity). Collective."""
+        columns: dict[str, tuple[float, str]] = {}
+        for term in self.terms:
+            columns |= term.record()
+        for support in self.supports:
+            if support.name:
+                columns[f"{support.name}_displacement"] = (support.displacement, "length")
+                columns[f"{support.name}_force"] = (self.reaction(support), "force")
+        return columns | self._trial_audit.record()
+
+    def rollback(self) -> None:
+        """Give the trial step up: displacement, constants and multipliers as before, bit for bit."""
+        self.state.rollback()
+        for term in self.terms:
+            term.rollback()
+        for support in self.supports:
+            support.begin(self.state.time)
+        self._trial_audit, self._residual = self.audit, self._residual_old
+
+    def commit(self) -> None:
+        """Adopt the trial step."""
+        for term in self.terms:
+            term.commit()
+        self.state.commit()
+        self.audit, self._residual_old = self._trial_audit, self._residual
+
+    def _interface_nodes(self, interfaces: Sequence[Crack | SurfacePair]) -> NDArray[np.int32]:
+        """Owned nodes on both faces of all cracks and pairs of surfaces."""
+        dofmap, tdim = self.state.V.dofmap, self.state.mesh.topology.dim
+        facets = cpp.mesh.cell_num_entities(self.state.mesh.topology.cell_type, tdim - 1)
+        closure = [dofmap.dof_layout.entity_closure_dofs(tdim - 1, f) for f in range(facets)]
+        marks = la.vector(dofmap.index_map, 1)
+        for interface in interfaces:
+            for cell, facet in interface.entities.reshape(-1, 2):
+                marks.array[dofmap.cell_dofs(cell)[closure[facet]]] = 1.0
+        marks.scatter_reverse(la.InsertMode.add)
+        return np.flatnonzero(marks.array[: dofmap.index_map.size_local]).astype(np.int32)

@@ -1,0 +1,130 @@
+"""One step of a body that deforms and conducts heat: mechanics at fixed temperature, heat at fixed shape."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+from mpi4py import MPI
+
+from cutsim.analysis.energy import EnergyAudit
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
+from cutsim.base.terms import Term
+from cutsim.heat.transfer import HeatTransfer
+from cutsim.solvers.newton import Outcome
+
+#: Passes of mechanics and heat allowed in one step.
+PASSES = 30
+
+
+class ThermoMechanics:
+    """Staggered step: isothermal mechanics, then heat conduction at the new displacement (docs/theory.md §5).
+
+    It is given to `cutsim.analysis.stepping.run` in place of `Mechanics`.
+
+    Args:
+        mechanics: The mechanical problem.
+        heat: The heat problem, on the same state.
+        iterate: Repeat both until the temperature changes nowhere by more than this from one pass to the next
+            [temperature]; None for one pass, whose error is of first order in the step.
+
+    Raises:
+        ValueError: The problems have different states, or `iterate` is not positive.
+    """
+
+    def __init__(self, mechanics: Mechanics, heat: HeatTransfer, *, iterate: float | None = None) -> None:
+        require("heat", heat.state, heat.state is mechanics.state, "a problem on the state of the mechanics")
+        require("iterate", iterate, iterate is None or iterate > 0, "> 0 or None")
+        self.mechanics, self.heat, self.iterate = mechanics, heat, iterate
+        self.state = mechanics.state
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Terms of both problems."""
+        return (*self.mechanics.terms, *self.heat.terms)
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """Fields of the solution for output, by name."""
+        return {**self.mechanics.fields, **self.heat.fields}
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which a path or load has a kink."""
+        return tuple(sorted({*self.mechanics.corners, *self.heat.corners}))
+
+    @property
+    def audit(self) -> EnergyAudit:
+        """Energy audit of the mechanics; the audit of heat is `heat.audit`."""
+        return self.mechanics.audit
+
+    @property
+    def trial_audit(self) -> EnergyAudit:
+        """Energy audit of the mechanics including the trial step."""
+        return self.mechanics.trial_audit
+
+    def begin(self, time: float) -> None:
+        """Start a trial step that ends at `time`."""
+        self.mechanics.begin(time)
+
+    def solve(self, line_search: str | None = None) -> Outcome:
+        """Find equilibrium and temperature. Collective.
+
+        Args:
+            line_search: "l2", "bt" or "basic"; the solver's default if None. It is for the mechanics: heat is linear.
+
+        Returns:
+            The outcome of the mechanics, iterations summed over the passes; that of heat if this has failed.
+        """
+        iterations = linear_iterations = 0
+        for _ in range(1 if self.iterate is None else PASSES):
+            outcome = self.mechanics.solve(line_search)
+            iterations += outcome.iterations
+            linear_iterations += outcome.linear_iterations
+            outcome = replace(outcome, iterations=iterations, linear_iterations=linear_iterations)
+            if not outcome.converged:
+                return outcome
+            self.mechanics.evaluate()
+            if not isfinite(self.mechanics.trial_audit.closure):
+                return replace(outcome, converged=False, message="no admissible equilibrium")
+            before = self.heat.temperature.value.x.array.copy()
+            self.heat.begin(self.state.time)
+            thermal = self.heat.solve()
+            if not thermal.converged:
+                return replace(thermal, message=f"heat: {thermal.message}")
+            if self.iterate is None or self._change(before) <= self.iterate:
+                return outcome
+        return replace(outcome, converged=False, message=f"temperature not settled by {PASSES} passes")
+
+    def _change(self, before: np.ndarray) -> float:
+        """Largest change of temperature at a node. Collective."""
+        change = np.abs(self.heat.temperature.value.x.array - before).max(initial=0.0)
+        return float(self.state.mesh.comm.allreduce(change, op=MPI.MAX))
+
+    def evaluate(self) -> None:
+        """Heat flows and audit of heat; the mechanics was evaluated at the temperature it was solved at. Collective."""
+        self.heat.evaluate()
+
+    def damage_increment(self) -> float:
+        """Largest growth of damage at a point in the trial step. Collective."""
+        return self.mechanics.damage_increment()
+
+    def diagnose(self) -> str:
+        """After a failed solve: what is wrong and where, in words. Collective."""
+        return "; ".join(words for part in (self.mechanics, self.heat) if (words := part.diagnose()))
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity). Collective."""
+        return self.mechanics.record() | self.heat.record()
+
+    def rollback(self) -> None:
+        """Give the trial step up, bit for bit."""
+        self.mechanics.rollback()
+        self.heat.rollback()
+
+    def commit(self) -> None:
+        """Adopt the trial step."""
+        self.mechanics.commit()
+        self.heat.commit()

@@ -1,0 +1,293 @@
+"""The loop over steps: the only place that commits.
+
+One step: begin → move tools and loads → solve → (failure: roll back, another line search, then a smaller step) → trial
+history → accept or reject → commit, record.
+"""
+
+import logging
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from math import isfinite
+from types import FrameType
+from typing import Protocol
+
+from mpi4py import MPI
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
+from cutsim.base.terms import Term
+from cutsim.fields.state import State
+from cutsim.solvers.newton import Outcome
+
+logger = logging.getLogger(__name__)
+
+# a step that would leave less than this fraction of itself before a corner is stretched to meet it
+_SLIVER = 0.1
+# corners that differ by less than this fraction of the smallest step are one
+_ROUNDING = 1e-6
+
+
+class Audit(Protocol):
+    """Books of a conserved quantity."""
+
+    @property
+    def closure(self) -> float:
+        """What is missing, relative to the largest turnover so far [–]."""
+
+
+class Problem(Protocol):
+    """What can be stepped: `cutsim.analysis.mechanics.Mechanics`, `HeatTransfer`, or both as `ThermoMechanics`.
+
+    Attributes:
+        state: Displacement and time.
+    """
+
+    state: State
+
+    @property
+    def terms(self) -> Sequence[Term]:
+        """Its terms."""
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """Fields beside the displacement for output, by name."""
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times that steps have to meet exactly."""
+
+    @property
+    def audit(self) -> Audit:
+        """Audit of the committed state."""
+
+    @property
+    def trial_audit(self) -> Audit:
+        """Audit including the trial step."""
+
+    def begin(self, time: float) -> None:
+        """Start a trial step that ends at `time`."""
+
+    def solve(self, line_search: str | None = None) -> Outcome:
+        """Solve the trial step. Collective."""
+
+    def evaluate(self) -> None:
+        """Trial history and audit of the solved step. Collective."""
+
+    def damage_increment(self) -> float:
+        """Largest growth of damage at a point in the trial step. Collective."""
+
+    def diagnose(self) -> str:
+        """After a failed solve: what is wrong and where, in words. Collective."""
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity). Collective."""
+
+    def rollback(self) -> None:
+        """Give the trial step up, bit for bit."""
+
+    def commit(self) -> None:
+        """Adopt the trial step."""
+
+
+class StepError(RuntimeError):
+    """No equilibrium was found with the smallest step allowed; what was recorded before stays readable."""
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """How large steps are.
+
+    Args:
+        first: First step, and the first one after each corner of a path [time].
+        largest: Largest step [time].
+        smallest: Step below which the run gives up [time]; a thousandth of `first` by default.
+        growth: Factor after an easy step, > 1.
+        cut: Factor after a rejected step, in (0, 1).
+        easy: Newton iterations up to which a step counts as easy.
+        damage: Largest growth of damage at a point in a step, in (0, 1]; None for no limit.
+        closure: Largest change of the energy audit's relative closure in a step; None for no limit.
+        line_searches: Line searches tried in turn for the same step.
+
+    Raises:
+        ValueError: A value is outside its range.
+    """
+
+    first: float
+    largest: float
+    smallest: float = 0.0
+    growth: float = 1.4
+    cut: float = 0.5
+    easy: int = 6
+    damage: float | None = None
+    closure: float | None = None
+    line_searches: tuple[str, ...] = ("l2", "bt")
+
+    def __post_init__(self) -> None:
+        require("first", self.first, self.first > 0, "> 0")
+        require("largest", self.largest, self.largest >= self.first, f">= first = {self.first}")
+        if not self.smallest:
+            object.__setattr__(self, "smallest", 1e-3 * self.first)
+        require("smallest", self.smallest, 0 < self.smallest <= self.first, f"in (0, first = {self.first}]")
+        require("growth", self.growth, self.growth > 1, "> 1")
+        require("cut", self.cut, 0 < self.cut < 1, "in (0, 1)")
+        require("damage", self.damage, self.damage is None or 0 < self.damage <= 1, "in (0, 1] or None")
+        require("closure", self.closure, self.closure is None or self.closure > 0, "> 0 or None")
+        require("line_searches", self.line_searches, len(self.line_searches) > 0, "at least one")
+
+    @classmethod
+    def fixed(cls, step: float) -> "StepControl":
+        """Equal steps as long as they converge; a step that fails is cut, and later ones grow back."""
+        return cls(first=step, largest=step)
+
+
+@dataclass
+class StepReport:
+    """One accepted step, for recorders.
+
+    Attributes:
+        number: Steps accepted so far.
+        time: Time at its end [time].
+        dt: Its size [time].
+        outcome: What the solver did.
+        cuts: Rejected attempts since the previous accepted step.
+        columns: History columns, name → (value, kind of quantity).
+    """
+
+    number: int
+    time: float
+    dt: float
+    outcome: Outcome
+    cuts: int
+    columns: dict[str, tuple[float, str]] = field(default_factory=dict)
+
+
+Recorder = Callable[[StepReport], None]
+
+
+def run(
+    problem: Problem,
+    until: float,
+    control: StepControl,
+    record: Recorder = lambda _: None,
+    stop: Callable[[StepReport], bool] = lambda _: False,
+) -> StepReport | None:
+    """Advance to a time. Collective.
+
+    Ctrl-C and SIGTERM end the run cleanly after the current step.
+
+    Args:
+        problem: The problem; it goes on from its committed state.
+        until: Time to reach [time].
+        control: Step sizes.
+        record: Called on all ranks after each accepted step.
+        stop: Asked on all ranks after each accepted step with reduced numbers; True ends the run.
+
+    Returns:
+        The last report, None if no step was needed.
+
+    Raises:
+        StepError: The smallest step was reached; says when, where and why.
+        ValueError: `until` is not later than the committed time.
+    """
+    state = problem.state
+    require("until", until, until > state.time_old, f"> the present time {state.time_old}")
+    corners = [c for c in (*problem.corners, until) if c <= until]
+    dt, report, number = control.first, None, 0
+    with _interruptible(state.mesh.comm) as interrupted:
+        while ahead := [c for c in corners if c > state.time_old + _ROUNDING * control.smallest]:
+            corner = min(ahead)
+            report = _advance(problem, control, dt, corner)
+            number += 1
+            report.number = number
+            record(report)
+            if stop(report) or interrupted():
+                break
+            dt = _next_step(control, report, dt, at_corner=state.time_old == corner)
+    return report
+
+
+def _advance(problem: Problem, control: StepControl, dt: float, corner: float) -> StepReport:
+    """One accepted step of at most dt that does not pass the corner."""
+    state, cuts = problem.state, 0
+    while True:
+        start = state.time_old
+        end = corner if start + (1 + _SLIVER) * dt >= corner else start + dt
+        outcome, refusal = _attempt(problem, control, end)
+        if refusal is None:
+            size = end - start
+            problem.commit()
+            return StepReport(0, end, size, outcome, cuts, problem.record())
+        problem.rollback()
+        cuts += 1
+        dt = control.cut * (end - start)
+        logger.info("step to %.6g rejected (%s); next try %.3g", end, refusal, dt)
+        if dt < control.smallest:
+            raise StepError(
+                f"no step from time {start:.6g} of {dt / control.cut:.3g} or more succeeds "
+                f"(smallest = {control.smallest:.3g}): {refusal}"
+            )
+
+
+def _attempt(problem: Problem, control: StepControl, end: float) -> tuple[Outcome, str | None]:
+    """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
+    before = problem.audit.closure
+    for line_search in control.line_searches:
+        problem.rollback()
+        problem.begin(end)
+        outcome = problem.solve(line_search)
+        failure = _failure(problem, outcome)
+        if failure is None:
+            break
+    else:
+        return outcome, failure
+    growth = problem.damage_increment()
+    if control.damage is not None and growth > control.damage:
+        return outcome, f"damage grows by {growth:.3g}, more than {control.damage:g}"
+    drift = abs(problem.trial_audit.closure - before)
+    if control.closure is not None and drift > control.closure:
+        return outcome, f"energy closure changes by {drift:.2g}, more than {control.closure:g}"
+    return outcome, None
+
+
+def _failure(problem: Problem, outcome: Outcome) -> str | None:
+    """Why a solve did not give an admissible state, in words; None if it did, and then the state is evaluated."""
+    if outcome.converged:
+        problem.evaluate()
+        # forces can balance around an inverted element, but then its energy has no value
+        if isfinite(problem.trial_audit.closure):
+            return None
+    why = "no admissible equilibrium" if outcome.converged else outcome.message
+    where = problem.diagnose()
+    return f"{why} after {outcome.iterations} iterations" + (f"; {where}" if where else "")
+
+
+def _next_step(control: StepControl, report: StepReport, dt: float, *, at_corner: bool) -> float:
+    """Grow after an easy step, keep the size of a cut one, start anew at a corner."""
+    if at_corner:
+        return control.first
+    size = min(dt, report.dt) if report.cuts else dt
+    if not report.cuts and report.outcome.iterations <= control.easy:
+        size *= control.growth
+    return min(size, control.largest)
+
+
+@contextmanager
+def _interruptible(comm: MPI.Comm) -> Iterator[Callable[[], bool]]:
+    """Turn the first SIGINT or SIGTERM into a question answered alike on all ranks."""
+    asked = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        if asked and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        asked = True
+        logger.warning("signal %s: the run ends after the current step", signal.Signals(number).name)
+
+    previous = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(comm.allreduce(asked, op=MPI.LOR))
+    finally:
+        for number, handler in previous.items():
+            signal.signal(number, handler)

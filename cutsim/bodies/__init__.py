@@ -1,0 +1,1 @@
+"""Terms of the bodies: strain energy, inertia, loads, supports."""

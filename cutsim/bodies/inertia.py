@@ -1,0 +1,272 @@
+"""Inertia of the solids: their mass, and velocity and acceleration along the steps (docs/dynamics.md).
+
+The scheme's balance at the end of a step, divided by 1 − α_f, is solved in the form
+
+    R(u) + c M a(u) + h = 0,    a(u) = (u − u*)/(β Δt²),    c = (1 − α_m)/(1 − α_f),
+
+with u* = u₀ + Δt v₀ + (½ − β) Δt² a₀ and the history forces h = (α_f R₀ + α_m M a₀)/(1 − α_f), which are known.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.assembly import Array, global_dot, nodal_forces, resultant
+from cutsim.base.checks import require
+from cutsim.base.compat import form
+from cutsim.base.kinematics import Expr
+from cutsim.base.terms import Term
+from cutsim.bodies.schemes import Scheme
+from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
+from cutsim.solvers.tangent import Tangent
+
+Velocity = Callable[[NDArray[np.float64]], NDArray[np.float64]] | Sequence[float]
+
+
+@dataclass(frozen=True)
+class _Books:
+    """Owned inertia forces M a and energies at the end of a step."""
+
+    forces: Array
+    kinetic: float = 0.0
+    numerical: float = 0.0
+
+
+class Inertia(Term):
+    """Inertia of solids; made by `cutsim.analysis.mechanics.Mechanics` for a dynamic analysis.
+
+    Args:
+        state: Displacement and time.
+        solids: The bodies; each needs a density.
+        scheme: Time integration.
+        mass: "consistent", or "lumped" by a quadrature in the nodes (degree 1, and degree 2 on quadrilaterals and
+            hexahedra; on simplices of degree 2 some nodes would have no mass).
+
+    Attributes:
+        velocity: Trial velocity [length/time].
+        acceleration: Trial acceleration [length/time²].
+        started: Whether the first step has begun; the initial velocity is then history.
+
+    Raises:
+        ValueError: There is no solid, one has no density, or the mass cannot be lumped.
+    """
+
+    name = "inertia"
+
+    def __init__(
+        self,
+        state: State,
+        solids: Sequence[Solid],
+        scheme: Scheme,
+        mass: Literal["consistent", "lumped"] = "consistent",
+    ) -> None:
+        require("terms", [s.name for s in solids], len(solids) > 0, "with a Solid in a dynamic analysis")
+        for solid in solids:
+            require(f"density of {solid.name}", solid.density, solid.density is not None, "> 0 in a dynamic analysis")
+        require("scheme", scheme, isinstance(scheme, Scheme), "a scheme such as Newmark() or GeneralisedAlpha(0.8)")
+        # a node on the axis would have no mass
+        whole = mass == "consistent" or not state.axisymmetric
+        require("mass", mass, whole, "'consistent' in an axisymmetric problem")
+        self.state, self.scheme, self.started = state, scheme, False
+        rule = _quadrature(state.V.ufl_element(), mass)
+        self._bodies = [
+            (fem.Constant(state.mesh, default_scalar_type(s.density)), state.measures.cells(s.cells)(metadata=rule))
+            for s in solids
+        ]
+        self.velocity = fem.Function(state.V, name="velocity")
+        self.acceleration = fem.Function(state.V, name="acceleration")
+        self._velocity_old, self._acceleration_old = np.zeros((2, len(self.velocity.x.array)))
+        self._predicted = fem.Function(state.V)
+        # c/(β Δt²); zero until the first step begins
+        self._weight = fem.Constant(state.mesh, default_scalar_type(0.0))
+        self._field = fem.Function(state.V)
+        self._momentum_form = form(self._mass(self._field, ufl.TestFunction(state.V)))
+        self._books = self._books_old = _Books(np.zeros(len(state.increment)))
+
+    # -- start ----------------------------------------------------------------------------------------------------
+
+    def set_velocity(self, value: Velocity, cells: NDArray[np.int32] | None = None) -> None:
+        """Set the initial velocity. Collective.
+
+        Where a support holds, its prescribed motion wins.
+
+        Args:
+            value: A vector, or a function of the positions (3, n) → (gdim, n) [length/time].
+            cells: Local cells of the body that has it (ghosts included); all by default.
+
+        Raises:
+            ValueError: The vector has the wrong number of components, or the first step has begun.
+        """
+        gdim = self.state.mesh.geometry.dim
+        require("velocity", value, not self.started, "set before the first step")
+        if not callable(value):
+            require("velocity", value, np.shape(value) == (gdim,), f"a function or {gdim} numbers")
+            vector = np.asarray(value, dtype=np.float64)
+            self.velocity.interpolate(lambda x: np.outer(vector, np.ones(x.shape[1])), cells)
+        else:
+            self.velocity.interpolate(value, cells)
+        self.velocity.x.scatter_forward()
+        self._velocity_old[:] = self.velocity.x.array
+
+    def prescribe(self, dofs: NDArray[np.int32], velocity: float, acceleration: float) -> None:
+        """Initial motion of owned dofs that a support moves."""
+        self.velocity.x.array[dofs], self.acceleration.x.array[dofs] = velocity, acceleration
+
+    def start(self, static: Array, bcs: Sequence[fem.DirichletBC], fixed: NDArray[np.bool_]) -> Array:
+        """Initial accelerations M a = −R, those of the prescribed dofs given. Collective.
+
+        Args:
+            static: Owned static forces R, internal minus external [force].
+            bcs: Dirichlet conditions.
+            fixed: Which owned dofs they prescribe.
+
+        Returns:
+            Forces R + M a: zero but for those of the supports.
+        """
+        a = self.acceleration.x
+        a.scatter_forward()
+        known = self._inertia_forces(a.array)
+        a.array[: len(static)] = self._divide_by_mass(np.where(fixed, a.array[: len(static)], -static - known), bcs)
+        for field, old in ((self.velocity, self._velocity_old), (self.acceleration, self._acceleration_old)):
+            field.x.scatter_forward()
+            old[:] = field.x.array
+        self._books = self._books_old = _Books(self._inertia_forces(a.array), self._kinetic())
+        self.started = True
+        return static + self._books.forces
+
+    def _divide_by_mass(self, forces: Array, bcs: Sequence[fem.DirichletBC]) -> Array:
+        V = self.state.V
+        mass = Tangent(form(self._mass(ufl.TrialFunction(V), ufl.TestFunction(V))), V, symmetric=True)
+        mass.assemble(bcs)
+        x, b = mass.A.createVecs()
+        b.array[:] = forces
+        ksp = PETSc.KSP().create(V.mesh.comm)
+        ksp.setOperators(mass.A)
+        ksp.setType("cg")
+        ksp.getPC().setType("jacobi")  # conditions a mass matrix independently of the mesh
+        ksp.setTolerances(rtol=1e-13)
+        ksp.setErrorIfNotConverged(True)
+        ksp.solve(b, x)
+        solution = x.array_r.copy()
+        for thing in (ksp, mass, x, b):
+            thing.destroy()
+        return solution
+
+    # -- steps ----------------------------------------------------------------------------------------------------
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Virtual work ∫ c ρ a(u)·v of the inertia forces."""
+        return self._mass(self._weight * (self.state.u - self._predicted), v)
+
+    def begin(self, time: float) -> None:
+        """Known part of the motion; the displacement starts from that at constant velocity."""
+        s, dt = self.scheme, self._dt
+        start = self.state.u_old.x.array + dt * self._velocity_old
+        self._predicted.x.array[:] = start + (0.5 - s.beta) * dt**2 * self._acceleration_old
+        self._weight.value = (1 - s.alpha_m) / (1 - s.alpha_f) / (s.beta * dt**2)
+        self.state.u.x.array[:] = start
+
+    def history(self, old: Array) -> Array:
+        """Known forces h of the step's balance.
+
+        Args:
+            old: Owned forces R + M a at the start of the step.
+        """
+        s = self.scheme
+        # R₀ is old − M a₀
+        weights = s.alpha_f / (1 - s.alpha_f), (s.alpha_m - s.alpha_f) / (1 - s.alpha_f)
+        return weights[0] * old + weights[1] * self._books_old.forces
+
+    def evaluate(self) -> None:
+        """Velocity, acceleration and their energies. Collective."""
+        s, dt, old = self.scheme, self._dt, self._books_old
+        a, v = self.acceleration.x.array, self.velocity.x.array
+        a[:] = (self.state.u.x.array - self._predicted.x.array) / (s.beta * dt**2)
+        v[:] = self._velocity_old + dt * ((1 - s.gamma) * self._acceleration_old + s.gamma * a)
+        forces, kinetic = self._inertia_forces(a), self._kinetic()
+        work = self._dot(0.5 * (forces + old.forces), self.state.increment)
+        self._books = _Books(forces, kinetic, old.numerical + work - (kinetic - old.kinetic))
+
+    def balance(self, solved: Array, old: Array, free: NDArray[np.bool_]) -> Array:
+        """Forces R + M a at the end of the step; call after `evaluate`. Collective.
+
+        A scheme with α_f > 0 balances forces within the step, so that those at its end are out of balance. Their work
+        is booked as numerical.
+
+        Args:
+            solved: Owned residual of the step's balance, R + c M a + h.
+            old: Forces R + M a at the start of the step.
+            free: Owned dofs without a support.
+        """
+        s, books = self.scheme, self._books
+        forces = solved - self.history(old) + (s.alpha_m - s.alpha_f) / (1 - s.alpha_f) * books.forces
+        work = self._dot(np.where(free, 0.5 * (forces + old), 0.0), self.state.increment)
+        self._books = _Books(books.forces, books.kinetic, books.numerical - work)
+        return forces
+
+    def energies(self) -> dict[str, float]:
+        """Kinetic energy ½ v·M v, and what the scheme has dissipated so far."""
+        return {"kinetic": self._books.kinetic, "numerical": self._books.numerical}
+
+    def momentum(self) -> Array:
+        """Linear momentum, one number a component [force·time]. Collective."""
+        return resultant(
+            self.state.mesh.comm, self._inertia_forces(self.velocity.x.array), self.state.mesh.geometry.dim
+        )
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Largest nodal speed. Collective."""
+        nodal = self.velocity.x.array[: len(self.state.increment)].reshape(-1, self.state.mesh.geometry.dim)
+        local = np.linalg.norm(nodal, axis=1).max(initial=0.0)
+        return {"velocity_max": (float(self.state.mesh.comm.allreduce(local, op=MPI.MAX)), "velocity")}
+
+    def rollback(self) -> None:
+        """Forget the motion of the step."""
+        self.velocity.x.array[:] = self._velocity_old
+        self.acceleration.x.array[:] = self._acceleration_old
+        self._books = self._books_old
+
+    def commit(self) -> None:
+        """Adopt the motion of the step."""
+        self._velocity_old[:] = self.velocity.x.array
+        self._acceleration_old[:] = self.acceleration.x.array
+        self._books_old = self._books
+
+    @property
+    def _dt(self) -> float:
+        return float(self.state.dt.value)
+
+    def _mass(self, w: Expr, v: Expr) -> ufl.Form:
+        return sum((density * ufl.inner(w, v) * dx for density, dx in self._bodies), start=ufl.Form([]))
+
+    def _inertia_forces(self, field: NDArray[np.float64]) -> Array:
+        """Mass matrix times a field (local entries, ghosts included): owned entries."""
+        self._field.x.array[:] = field
+        return nodal_forces(self._momentum_form)
+
+    def _kinetic(self) -> float:
+        v = self.velocity.x.array
+        return 0.5 * self._dot(v[: len(self.state.increment)], self._inertia_forces(v))
+
+    def _dot(self, a: Array, b: Array) -> float:
+        return global_dot(self.state.mesh.comm, a, b)
+
+
+def _quadrature(element: ufl.finiteelement.AbstractFiniteElement, mass: str) -> dict[str, int | str]:
+    """Quadrature of the mass: full, or with its points in the nodes."""
+    require("mass", mass, mass in ("consistent", "lumped"), "'consistent' or 'lumped'")
+    degree, cell = element.degree, element.cell_type.name
+    if mass == "consistent":
+        return {"quadrature_degree": 2 * degree}
+    simplex = cell in ("triangle", "tetrahedron")
+    require("mass", mass, degree == 1 or not simplex, f"'consistent' on a {cell} of degree {degree}")
+    # Gauss-Lobatto points of a line are the nodes of degree 2, too
+    return {"quadrature_rule": "vertex" if degree == 1 else "GLL", "quadrature_degree": 2 * degree - 1}

@@ -1,0 +1,210 @@
+"""Supports and loads."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from numpy.typing import NDArray
+
+from cutsim.base.assembly import global_dot, nodal_forces, resultant
+from cutsim.base.checks import require
+from cutsim.base.compat import form
+from cutsim.base.kinematics import Expr, cofactor
+from cutsim.base.parameters import History, Schedule
+from cutsim.base.terms import Term
+from cutsim.fields.space import locate_dofs
+from cutsim.fields.state import State
+
+
+class Support:
+    """Prescribed displacement of one component on some facets (or vertices), with its reaction.
+
+    On a crack it holds all its sides.
+
+    Args:
+        state: Displacement and time.
+        entities: Local mesh entities.
+        component: Index of the displacement component.
+        value: Displacement, a number or a function of time [length].
+        name: Name in the history, None to leave the reaction out of it.
+        dim: Dimension of the entities; facets by default.
+        corners: Times at which the velocity jumps.
+
+    Attributes:
+        dofs: Owned dofs that it holds.
+
+    Raises:
+        ValueError: The component does not exist, or no entity is found on any rank.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        entities: NDArray[np.int32],
+        component: int,
+        value: float | History = 0.0,
+        *,
+        name: str | None = None,
+        dim: int | None = None,
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require("component", component, component in range(gdim), f"0 … {gdim - 1}")
+        dim = state.mesh.topology.dim - 1 if dim is None else dim
+        self.name, self.state, self.component, self.corners = name, state, component, corners
+        dofs = gdim * locate_dofs(state.V, dim, entities) + component
+        owned = len(state.increment)
+        self.dofs = dofs[dofs < owned]
+        found = state.mesh.comm.allreduce(len(self.dofs))
+        require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
+        self._value = Schedule(state.mesh, value)
+        self.bc = fem.dirichletbc(self._value.constant, dofs, state.V.sub(component))
+
+    @property
+    def displacement(self) -> float:
+        """Prescribed displacement at the end of the step [length]."""
+        return self._value.value
+
+    def begin(self, time: float) -> None:
+        """Set the displacement to its value at a time."""
+        self._value.begin(time)
+
+    def rates(self, start: float, end: float) -> tuple[float, float]:
+        """Prescribed velocity and acceleration at the start of a span of time without a corner."""
+        return self._value.rates(start, end)
+
+    def reaction(self, residual: NDArray[np.float64]) -> float:
+        """Force of the support on the body along its component [force]. Collective.
+
+        Args:
+            residual: Owned entries of internal minus external nodal forces.
+        """
+        return float(self.state.mesh.comm.allreduce(float(residual[self.dofs].sum())))
+
+
+class _Load(Term, ABC):
+    """Load on a part of the boundary, `_density` per reference area; it follows one factor that varies in time."""
+
+    def __init__(
+        self, state: State, facets: NDArray[np.int32], factor: History, name: str, corners: tuple[float, ...]
+    ) -> None:
+        self.name, self.state, self._corners = name, state, corners
+        self._ds = state.measures.exterior(facets)
+        self._factor = Schedule(state.mesh, factor)
+        self._scale = self._factor.constant
+        self._form = form(self.residual(ufl.TestFunction(state.V)))
+        self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
+        self._forces_old: NDArray[np.float64] = self._forces
+
+    @abstractmethod
+    def _density(self) -> Expr:
+        """Force per reference area at factor 1, a vector [stress]."""
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which the factor has a kink."""
+        return self._corners
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Minus the virtual work of the load."""
+        return -self._scale * ufl.dot(self._density(), v) * self._ds
+
+    def begin(self, time: float) -> None:
+        """Set the load to its value at a time."""
+        self._factor.begin(time)
+
+    def rollback(self) -> None:
+        """Set the load back to the start of the step."""
+        self._factor.begin(self.state.time_old)
+        self._forces = self._forces_old
+
+    def evaluate(self) -> None:
+        """Nodal forces of the load. Collective."""
+        self._forces = -nodal_forces(self._form)
+
+    def external_work(self) -> float:
+        """Work of the load in the step: mean force times displacement increment. Collective."""
+        mean = 0.5 * (self._forces + self._forces_old)
+        return global_dot(self.state.mesh.comm, mean, self.state.increment)
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Resultant of the load. Collective."""
+        total = resultant(self.state.mesh.comm, self._forces, self.state.mesh.geometry.dim)
+        return {f"{self.name}_force_{'xyz'[i]}": (float(f), "force") for i, f in enumerate(total)}
+
+    def commit(self) -> None:
+        """Adopt the forces."""
+        self._forces_old = self._forces
+
+
+class Traction(_Load):
+    """Dead traction on a part of the boundary.
+
+    Args:
+        state: Displacement and time.
+        facets: Local exterior facets.
+        direction: Traction at factor 1, one number a component [stress].
+        factor: Function of time that scales it.
+        name: Name in messages and output.
+        corners: Times at which the factor has a kink.
+
+    Raises:
+        ValueError: The direction has the wrong number of components.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        direction: tuple[float, ...],
+        factor: History,
+        *,
+        name: str = "load",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require("direction", direction, len(direction) == gdim, f"{gdim} numbers")
+        self._direction = direction
+        super().__init__(state, facets, factor, name, corners)
+
+    def _density(self) -> Expr:
+        return ufl.as_vector(self._direction)
+
+
+class Pressure(_Load):
+    """Pressure of a fluid on a part of the boundary: it acts along the current normal, per current area.
+
+    Nanson's formula gives the force −p cof(F) N per reference area; in plane stress the change of thickness is left
+    out.
+
+    Args:
+        state: Displacement and time.
+        facets: Local exterior facets.
+        pressure: Function of time, > 0 pushes on the body [stress].
+        name: Name in messages and output.
+        corners: Times at which the pressure has a kink.
+
+    Raises:
+        ValueError: There is no such facet.
+    """
+
+    symmetric = False
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        pressure: History,
+        *,
+        name: str = "pressure",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        super().__init__(state, facets, pressure, name, corners)
+
+    def _density(self) -> Expr:
+        gdim = self.state.mesh.geometry.dim
+        N = ufl.FacetNormal(self.state.mesh)
+        outward = ufl.as_vector([*(N[i] for i in range(gdim)), *[0] * (3 - gdim)])
+        force = cofactor(self.state.deformation_gradient(self.state.u)) * outward
+        return -ufl.as_vector([force[i] for i in range(gdim)])

@@ -1,0 +1,321 @@
+"""A deformable body: hyperelastic bulk, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
+
+import logging
+from typing import Literal
+
+import basix
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.assembly import integrate
+from cutsim.base.checks import require
+from cutsim.base.compat import expression, form
+from cutsim.base.kinematics import Expr, cofactor, deformation_gradient, green_lagrange
+from cutsim.base.parameters import with_constants
+from cutsim.base.terms import Term
+from cutsim.bodies.volume_change import VolumeChange
+from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
+from cutsim.materials.elastic import Material
+from cutsim.materials.thermoelastic import ThermoElastic
+from cutsim.materials.viscoelastic import Overstress, Prony
+
+logger = logging.getLogger(__name__)
+
+#: Poisson's ratio from which the volumetric part is integrated with fewer points by default.
+NEARLY_INCOMPRESSIBLE = 0.45
+
+
+class Solid(Term):
+    """Hyperelastic body that occupies some cells.
+
+    Args:
+        state: Displacement and time.
+        material: Strain energy.
+        cells: Local cells of the body (ghosts allowed); all by default.
+        name: Name in messages and output.
+        plane: For two-dimensional meshes, plane strain or plane stress (unit thickness).
+        volumetric: "full" or "reduced" integration of the volumetric part; by default reduced for ν ≥ 0.45.
+            On simplices of degree 1 both coincide, and a warning says that the element locks. "mixed" projects the
+            volume change in each quadrilateral or hexahedron (docs/elements.md); with a material whose volumetric
+            part depends on det F only, and without thermal expansion.
+        viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
+        relaxation: Prony series by which all but the volumetric part relaxes; the material is then the relaxed one.
+            The stresses of the methods below are without overstress.
+        density: Mass per reference volume, > 0; needed by dynamics and heat only [mass/length³].
+        thermoelastic: Thermal expansion and shear modulus that depends on temperature.
+        temperature: The temperature that acts on the body; with `thermoelastic` only.
+
+    Attributes:
+        measures: Measures over the body that integrate the two parts of the strain energy.
+
+    Raises:
+        ValueError: A parameter is outside its range.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        material: Material,
+        cells: NDArray[np.int32] | None = None,
+        *,
+        name: str = "body",
+        plane: Literal["strain", "stress"] = "strain",
+        volumetric: Literal["auto", "full", "reduced", "mixed"] = "auto",
+        viscosity: float = 0.0,
+        relaxation: Prony | None = None,
+        density: float | None = None,
+        thermoelastic: ThermoElastic | None = None,
+        temperature: Temperature | None = None,
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
+        require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
+        require("plane", plane, plane == "strain" or not state.axisymmetric, "'strain' in an axisymmetric problem")
+        kinds = ("auto", "full", "reduced", "mixed")
+        require("volumetric", volumetric, volumetric in kinds, "'auto', 'full', 'reduced' or 'mixed'")
+        require("viscosity", viscosity, viscosity >= 0, ">= 0")
+        require("density", density, density is None or density > 0, "> 0")
+        # there λ₃ would depend on the overstress
+        require("plane", plane, plane == "strain" or relaxation is None, "'strain' for a material that relaxes")
+        self.name = name
+        self.state = state
+        self.material = material
+        self._law = with_constants(state.mesh, material)
+        self.plane = plane
+        self.viscosity = viscosity
+        self.density = density
+        self._couple(thermoelastic, temperature)
+        self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
+        self.cells = cells
+        self.measures = self._choose_measures(volumetric)
+        self.assembles = volumetric == "mixed"
+        self._mixed = self._projected() if self.assembles else None
+        self._overstress = None if relaxation is None else self._relaxing(relaxation)
+        self._energy_form = form(self._stored(state.u))
+        self._viscous_form = form(self._viscous_work()) if viscosity else None
+        self._viscous = self._viscous_old = 0.0
+        self._thermal = self._thermal_old = 0.0
+        if thermoelastic is not None and temperature is not None:
+            self._start_heating(thermoelastic.reference, temperature)
+
+    def _couple(self, law: ThermoElastic | None, temperature: Temperature | None) -> None:
+        together = (law is None) == (temperature is None)
+        require("temperature", temperature, together, "given with thermoelastic, and only then")
+        same = temperature is None or temperature.state is self.state
+        require("temperature", temperature, same, "a temperature made with the state of the body")
+        constant = law is None or law.softening == 0
+        # there λ₃ would have to be solved for with another ratio of the moduli at each temperature
+        require("plane", self.plane, self.plane == "strain" or constant, "'strain' if thermoelastic.softening is not 0")
+        self.temperature = temperature
+        self._thermoelastic = None if law is None else with_constants(self.state.mesh, law)
+
+    def _start_heating(self, reference: float, temperature: Temperature) -> None:
+        """Count what heat has brought before the start, from the reference temperature on."""
+        self._temperature_seen = fem.Function(temperature.space)
+        self._temperature_seen.x.array[:] = reference
+        self._heating_form = form(self._heating(temperature.value))
+        self._thermal = self._thermal_old = -integrate(self._heating_form)
+        self._temperature_trial = temperature.value.x.array.copy()
+        self._temperature_seen.x.array[:] = self._temperature_trial
+
+    def deformation_gradient(self, u: Expr) -> Expr:
+        """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""
+        return self._deformation_gradient(u, self._temperature())
+
+    def first_piola(self, u: Expr) -> Expr:
+        """First Piola–Kirchhoff stress P = ∂W/∂F, 3 × 3 [stress]."""
+        F = ufl.variable(self.deformation_gradient(u))
+        if self._mixed is not None:
+            return ufl.diff(self._energy(F, None)[0], F) + self._mixed.pressure * cofactor(F)
+        return ufl.diff(sum(self._energy(F, self._temperature())), F)
+
+    def cauchy_stress(self, u: Expr) -> Expr:
+        """Cauchy stress σ = P Fᵀ / J, 3 × 3 [stress]."""
+        F = self.deformation_gradient(u)
+        return self.first_piola(u) * F.T / ufl.det(F)
+
+    def strain_energy_density(self, u: Expr) -> Expr:
+        """Strain energy per reference volume W [energy/length³]."""
+        return sum(self._parts(u, self._temperature()))
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Virtual work of the elastic and viscous stresses."""
+        u = self.state.u
+        work = ufl.derivative(self._stored(u), u, v)
+        if self._mixed is not None:
+            J = ufl.det(self.deformation_gradient(u))
+            work += self._mixed.pressure * ufl.derivative(J, u, v) * self.measures[0]
+        if self.viscosity:
+            E, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
+            rate = (E - old) / self.state.dt
+            work += self._viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
+        if self._overstress is not None:
+            work += self._overstress.residual(v)
+        return work
+
+    def prepare(self) -> None:
+        """Project the volume change of mixed elements. Collective."""
+        if self._mixed is not None:
+            self._mixed.prepare()
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
+        """Add, times a displacement, the tangent that goes through the projected volume change. Collective."""
+        if self._mixed is not None and along is not None:
+            self._mixed.add_forces(b, along)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add the tangent that goes through the projected volume change. Collective."""
+        if self._mixed is not None:
+            self._mixed.add_tangent(A)
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros for it. Collective."""
+        if self._mixed is not None:
+            self._mixed.add_pattern(A)
+
+    def begin(self, time: float) -> None:
+        """Relax the overstress over the step."""
+        if self._overstress is not None:
+            self._overstress.begin()
+
+    def evaluate(self) -> None:
+        """Add the viscous dissipation of the step, and what the change of temperature adds. Collective."""
+        if self._viscous_form is not None:
+            self._viscous = self._viscous_old + integrate(self._viscous_form)
+        if self._overstress is not None:
+            self._overstress.evaluate()
+        if self.temperature is not None:
+            self._thermal = self._thermal_old - integrate(self._heating_form)
+            self._temperature_trial = self.temperature.value.x.array.copy()
+
+    def energies(self) -> dict[str, float]:
+        """Strain energy, work of viscous stresses and minus the strain energy brought by heat so far. Collective."""
+        self.prepare()
+        viscous = self._viscous + (0.0 if self._overstress is None else self._overstress.work)
+        return {"strain": integrate(self._energy_form), "viscous": viscous, "thermoelastic": self._thermal}
+
+    def diagnose(self) -> str | None:
+        """Name the body if an element is inverted. Collective."""
+        smallest = self.smallest_jacobian()
+        return f"{self.name}: element inverted, smallest J = {smallest:.3g}" if not smallest > 0 else None
+
+    def smallest_jacobian(self) -> float:
+        """Smallest det F at the integration points. Collective."""
+        cell = basix.CellType[self.state.mesh.topology.cell_name()]
+        points = basix.make_quadrature(cell, self.measures[0].metadata()["quadrature_degree"])[0]
+        owned = self.state.mesh.topology.index_map(self.state.mesh.topology.dim).size_local
+        cells = np.arange(owned, dtype=np.int32) if self.cells is None else self.cells[self.cells < owned]
+        J = expression(ufl.det(self.deformation_gradient(self.state.u)), points, self.state.mesh)
+        values = J.eval(self.state.mesh, cells)
+        local = float(np.nan_to_num(values, nan=-np.inf).min()) if values.size else np.inf
+        return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
+
+    def rollback(self) -> None:
+        """Forget the energies of the step."""
+        self._viscous, self._thermal = self._viscous_old, self._thermal_old
+        if self._overstress is not None:
+            self._overstress.rollback()
+
+    def commit(self) -> None:
+        """Adopt the energies, and the temperature at which the step was in equilibrium."""
+        self._viscous_old, self._thermal_old = self._viscous, self._thermal
+        if self._overstress is not None:
+            self._overstress.commit()
+        if self.temperature is not None:
+            self._temperature_seen.x.array[:] = self._temperature_trial
+
+    def _choose_measures(self, volumetric: str) -> tuple[ufl.Measure, ufl.Measure]:
+        element = self.state.V.ufl_element()
+        cell, degree = element.cell_type.name, element.degree
+        simplex = cell in ("triangle", "tetrahedron")
+        # full integration: (degree + 1) points in each direction of a tensor-product cell, exact stiffness on simplices
+        full = 2 * (degree - 1) if simplex else 2 * degree
+        if volumetric == "auto":
+            volumetric = "reduced" if self.material.poisson >= NEARLY_INCOMPRESSIBLE else "full"
+        if self.material.poisson >= NEARLY_INCOMPRESSIBLE and simplex and degree == 1:
+            logger.warning(
+                "%s: a linear %s locks at Poisson's ratio %.3g; use quadrilaterals, hexahedra or degree 2",
+                self.name,
+                cell,
+                self.material.poisson,
+            )
+        # a marker for each rule, hence a kernel for each: FFCx 0.9 mixes the Jacobians of two rules up within a kernel
+        # when one of them has a single point
+        degrees = full, max(full - 2, 1) if volumetric == "reduced" else full
+        first, second = (
+            self.state.measures.cells(self.cells)(metadata={"quadrature_degree": degree}) for degree in degrees
+        )
+        return first, second
+
+    def _relaxing(self, relaxation: Prony) -> Overstress:
+        F = ufl.variable(self.deformation_gradient(self.state.u))
+        energy = self._energy(F, self._temperature())[0]
+        stress = ufl.inv(F) * ufl.diff(energy, F)
+        return Overstress(self.state, relaxation, energy, stress, self.measures[0], self.cells)
+
+    def _temperature(self) -> Expr | None:
+        return None if self.temperature is None else self.temperature.value
+
+    def _deformation_gradient(self, u: Expr, T: Expr | None) -> Expr:
+        F = self.state.deformation_gradient(u)
+        if self.plane == "strain":
+            return F
+        if self._thermoelastic is None:
+            return deformation_gradient(u, self._law.plane_stress_stretch(F))
+        stretch = self._thermoelastic.stretch(T)
+        return deformation_gradient(u, stretch * self._law.plane_stress_stretch(F / stretch))
+
+    def _energy(self, F: Expr, T: Expr | None) -> tuple[Expr, Expr]:
+        """Both parts of the strain energy per reference volume."""
+        if self._thermoelastic is None:
+            return self._law.energy(F)
+        stretch, factor = self._thermoelastic.stretch(T), self._thermoelastic.shear_factor(T)
+        shear, volumetric = self._law.energy(F / stretch)
+        return factor * stretch**3 * shear, stretch**3 * volumetric
+
+    def _parts(self, u: Expr, T: Expr | None) -> tuple[Expr, Expr]:
+        """Both parts of the strain energy per reference volume ; mixed elements know that of the state only."""
+        shear, volumetric = self._energy(self._deformation_gradient(u, T), T)
+        return shear, volumetric if self._mixed is None else self._volumetric(self._mixed.value)
+
+    def _volumetric(self, J: Expr) -> Expr:
+        """Volumetric part of the strain energy as a function of the volume change."""
+        return self._law.energy(J ** (1 / 3) * ufl.Identity(3))[1]
+
+    def _projected(self) -> VolumeChange:
+        cell = self.state.mesh.topology.cell_name()
+        require("volumetric", "mixed", cell in ("quadrilateral", "hexahedron"), f"'reduced' on a {cell}")
+        require("volumetric", "mixed", self.plane == "strain", "'full' or 'reduced' in plane stress")
+        require("volumetric", "mixed", self.temperature is None, "'full' or 'reduced' with thermal expansion")
+        kind = type(self.material).__name__
+        require("volumetric", "mixed", _by_volume(self.material), f"'full' or 'reduced' for {kind}")
+        J = ufl.det(self.deformation_gradient(self.state.u))
+        return VolumeChange(self.state, J, self._volumetric, self.measures[0], self.cells)
+
+    def _stored(self, u: Expr, T: Expr | None = None) -> ufl.Form:
+        shear, volumetric = self._parts(u, self._temperature() if T is None else T)
+        dx, dx_volumetric = self.measures
+        return shear * dx + volumetric * dx_volumetric
+
+    def _heating(self, T: Expr) -> ufl.Form:
+        """Strain energy brought by the change of temperature since the last equilibrium, trapezoidal in u."""
+        new, old = self.state.u, self.state.u_old
+        seen = self._temperature_seen
+        total = self._stored(new, T) - self._stored(new, seen) + self._stored(old, T) - self._stored(old, seen)
+        return 0.5 * total
+
+    def _viscous_work(self) -> ufl.Form:
+        new, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
+        return self._viscosity / self.state.dt * ufl.inner(new - old, new - old) * self.measures[0]
+
+
+def _by_volume(material: Material) -> bool:
+    """Whether the volumetric part is a function of det F: a stretch and a growth of the same volume tell."""
+    stretch, growth = np.diag([2.0, 1.0, 1.0]), 2 ** (1 / 3) * np.eye(3)
+    first, second = (float(material.energy(ufl.as_matrix(F.tolist()))[1](())) for F in (stretch, growth))
+    return abs(first - second) < 1e-9 * abs(first)

@@ -1,0 +1,175 @@
+"""Integration points on facets: history that lives there, expressions evaluated there, sums over them."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem, la
+from dolfinx.mesh import Mesh, create_submesh
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from cutsim.base.compat import form
+from cutsim.base.kinematics import Expr
+from cutsim.fields.state import State
+
+#: Degree of the quadrature on interfaces and tool surfaces.
+DEGREE = 4
+
+Values = NDArray[np.float64]
+
+
+class FacetPoints:
+    """The integration points of a facet measure, and what is known there.
+
+    Arrays of point values have the shape (local facets, points) or, for vectors, (local facets, points, components), in
+    the order of `facets`; they are equal on owner and ghosts.
+
+    Args:
+        mesh: The mesh.
+        facets: Local facets, ghosts included.
+        measure: Measure over them, interior if `interior`.
+        interior: Whether the facets have a cell on either side.
+        degree: Degree of the quadrature.
+
+    Attributes:
+        degree: Degree of the quadrature.
+        measure: The measure, with its quadrature rule.
+        submesh: Mesh of the facets, on which history functions live.
+        facets: Local facet of the parent mesh for each cell of the submesh.
+        weights: Weights of the points in the reference configuration [length or area].
+    """
+
+    def __init__(
+        self, mesh: Mesh, facets: NDArray[np.int32], measure: ufl.Measure, *, interior: bool, degree: int = DEGREE
+    ) -> None:
+        fdim = mesh.topology.dim - 1
+        self._interior, self.degree = interior, degree
+        self.measure = measure(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
+        self.submesh, parents = create_submesh(mesh, fdim, np.unique(np.asarray(facets, dtype=np.int32)))[:2]
+        self.facets = np.asarray(parents, dtype=np.int32)
+        index_map = mesh.topology.index_map(fdim)
+        self._facet_to_cell = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
+        self._facet_to_cell[parents] = np.arange(len(parents), dtype=np.int32)
+        self._owned = self.submesh.topology.index_map(fdim).size_local
+        self.weights = self._assemble({"one": ufl.as_ufl(1.0)})()["one"]
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+        """Map from facets of the mesh to cells of the submesh, for forms with functions of these points."""
+        return {self.submesh: self._facet_to_cell}
+
+    def function(self, components: int = 1) -> fem.Function:
+        """A function with a value, or a vector of values, at each point."""
+        return fem.Function(self._space(components))
+
+    def at(self, f: fem.Function) -> Expr:
+        """A function of the points as it enters a form over them."""
+        return f("+") if self._interior else f
+
+    def get(self, f: fem.Function) -> Values:
+        """Point values of a function made by `function`."""
+        dofs, bs = f.function_space.dofmap.list, f.function_space.dofmap.index_map_bs
+        values = f.x.array.reshape(-1, bs)[dofs]
+        return values if bs > 1 else values[..., 0]
+
+    def set(self, f: fem.Function, values: Values) -> None:
+        """Assign point values to a function made by `function`."""
+        dofs, bs = f.function_space.dofmap.list, f.function_space.dofmap.index_map_bs
+        f.x.array.reshape(-1, bs)[dofs] = values.reshape(*dofs.shape, bs)
+
+    def evaluator(self, expressions: Mapping[str, Expr]) -> Callable[[], dict[str, Values]]:
+        """Compile expressions, restricted as in a form over the points.
+
+        Args:
+            expressions: Scalars and vectors by name.
+
+        Returns:
+            A collective function without arguments that gives the present values by name.
+        """
+        assemble = self._assemble(expressions)
+
+        def evaluate() -> dict[str, Values]:
+            # the transposed weights broadcast over scalars and vectors alike
+            return {name: (values.T / self.weights.T).T for name, values in assemble().items()}
+
+        return evaluate
+
+    def integral(self, values: Values) -> float:
+        """Integral over the facets of point values. Collective."""
+        owned = slice(0, self._owned)
+        return float(self.submesh.comm.allreduce((values * self.weights)[owned].sum(), op=MPI.SUM))
+
+    def maximum(self, values: Values) -> float:
+        """Largest point value, −∞ if there is no point. Collective."""
+        return float(self.submesh.comm.allreduce(float(values[: self._owned].max(initial=-np.inf)), op=MPI.MAX))
+
+    def facet_mean(self, values: Values) -> Values:
+        """Mean over each local facet of point values."""
+        return (values * self.weights).sum(axis=1) / self.weights.sum(axis=1)
+
+    def mean(self, per_facet: Values) -> float:
+        """Mean over all facets of one value per local facet, unweighted. Collective."""
+        total = np.array([per_facet[: self._owned].sum(), self._owned])
+        total = self.submesh.comm.allreduce(total, op=MPI.SUM)
+        return float(total[0] / total[1])
+
+    def _space(self, components: int) -> fem.FunctionSpace:
+        shape = () if components == 1 else (components,)
+        cell = self.submesh.topology.cell_name()
+        return fem.functionspace(
+            self.submesh, basix.ufl.quadrature_element(cell, value_shape=shape, degree=self.degree)
+        )
+
+    def _assemble(self, expressions: Mapping[str, Expr]) -> Callable[[], dict[str, Values]]:
+        """Expressions times weights: one vector form for all of them."""
+        sizes = {name: int(np.prod(e.ufl_shape, dtype=int)) for name, e in expressions.items()}
+        parts = [p for e in expressions.values() for p in ([e] if e.ufl_shape == () else [e[i] for i in range(len(e))])]
+        space = self._space(len(parts))
+        integrand = ufl.as_vector(parts) if len(parts) > 1 else parts[0]
+        test = self.at(ufl.TestFunction(space))
+        compiled = form(ufl.inner(integrand, test) * self.measure, entity_maps=self.entity_maps)
+        dofs = space.dofmap.list
+
+        def assemble() -> dict[str, Values]:
+            b = fem.assemble_vector(compiled)
+            b.scatter_reverse(la.InsertMode.add)
+            b.scatter_forward()
+            values = b.array.reshape(-1, len(parts))[dofs]
+            columns = np.split(values, np.cumsum(list(sizes.values()))[:-1], axis=-1)
+            return {
+                name: column if e.ufl_shape else column[..., 0]
+                for (name, e), column in zip(expressions.items(), columns, strict=True)
+            }
+
+        return assemble
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface that a tool can touch: its integration points and, for a crack, the side of it.
+
+    Args:
+        points: Integration points.
+        side: "+" or "-" on a crack, None on the outer boundary.
+    """
+
+    points: FacetPoints
+    side: Literal["+", "-"] | None = None
+
+    @classmethod
+    def exterior(cls, state: State, facets: NDArray[np.int32]) -> "Surface":
+        """A part of the outer boundary, given by its local facets. Collective."""
+        return cls(FacetPoints(state.mesh, facets, state.measures.exterior(facets), interior=False))
+
+    @property
+    def measure(self) -> ufl.Measure:
+        """Measure over the surface in the reference configuration."""
+        return self.points.measure
+
+    def restrict(self, f: Expr) -> Expr:
+        """Restriction of a field of the body to the side."""
+        return f if self.side is None else f(self.side)

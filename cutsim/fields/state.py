@@ -1,0 +1,88 @@
+"""What changes in a run: displacement and time, each with a trial and a committed value."""
+
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+
+from cutsim.base import kinematics
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
+from cutsim.fields.measures import Measures
+
+
+class State:
+    """Displacement, time and step size, trial and committed.
+
+    Args:
+        V: Vector space of the displacement, usually from `cutsim.fields.space.cracked_space`.
+        axisymmetric: Whether the mesh is a meridian plane, the axis of rotation at x₀ = r = 0 and along x₁ = z
+            (docs/elements.md). Forces and energies are then those of the whole body of revolution.
+
+    Attributes:
+        u: Trial displacement [length].
+        u_old: Committed displacement, at the start of the step.
+        time: Time at the end of the step (trial) [time].
+        dt: Step size as a form constant.
+        measures: Integration measures that the terms share.
+
+    Raises:
+        ValueError: The space is not one of vectors, or the mesh is no meridian plane.
+    """
+
+    def __init__(self, V: fem.FunctionSpace, *, axisymmetric: bool = False) -> None:
+        require("V", V.value_shape, V.value_shape == (V.mesh.geometry.dim,), "a vector space of the mesh's dimension")
+        if axisymmetric:
+            _check_meridian(V.mesh)
+        self.axisymmetric = axisymmetric
+        self.V = V
+        self.mesh = V.mesh
+        self.u = fem.Function(V, name="u")
+        self.u_old = fem.Function(V, name="u_old")
+        self.dt = fem.Constant(V.mesh, default_scalar_type(1.0))
+        self.measures = Measures(V.mesh, axisymmetric=axisymmetric)
+        self.time = 0.0
+        self.time_old = 0.0
+        self._dt_old = float(self.dt.value)
+
+    def begin(self, time: float) -> None:
+        """Start a step that ends at `time`; the trial displacement starts from the committed one."""
+        self.time = time
+        self.dt.value = time - self.time_old
+
+    def rollback(self) -> None:
+        """Restore the committed displacement and time bit for bit."""
+        self.u.x.array[:] = self.u_old.x.array
+        self.time = self.time_old
+        self.dt.value = self._dt_old
+
+    def commit(self) -> None:
+        """Adopt the trial displacement and time."""
+        self.u_old.x.array[:] = self.u.x.array
+        self.time_old = self.time
+        self._dt_old = float(self.dt.value)
+
+    def deformation_gradient(self, u: Expr) -> Expr:
+        """Deformation gradient of a displacement, 3 × 3, with the hoop stretch 1 + u_r/r of an axisymmetric problem."""
+        hoop = 1 + u[0] / ufl.SpatialCoordinate(self.mesh)[0] if self.axisymmetric else 1.0
+        return kinematics.deformation_gradient(u, hoop)
+
+    @property
+    def facet_measure(self) -> str:
+        """What the measure of a facet is, "length" or "area"."""
+        return "area" if self.axisymmetric or self.mesh.geometry.dim == 3 else "length"
+
+    @property
+    def increment(self) -> np.ndarray:
+        """Displacement increment of the step, owned dofs [length]."""
+        owned = self.V.dofmap.index_map.size_local * self.V.dofmap.index_map_bs
+        return self.u.x.array[:owned] - self.u_old.x.array[:owned]
+
+
+def _check_meridian(mesh: Mesh) -> None:
+    """Refuse an axisymmetric problem on a mesh that is not flat or reaches beyond the axis. Collective."""
+    require("axisymmetric", True, mesh.geometry.dim == 2, "False on a 3-D mesh")
+    x = mesh.geometry.x[:, 0]
+    low, high = (mesh.comm.allreduce(pick(x, initial=0.0), op) for pick, op in ((np.min, MPI.MIN), (np.max, MPI.MAX)))
+    require("axisymmetric", True, low >= -1e-9 * high, f"False on a mesh with radii x[0] < 0, such as {low:.3g}")

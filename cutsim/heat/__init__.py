@@ -1,0 +1,1 @@
+"""Conduction, and heat made and exchanged where surfaces meet."""

@@ -1,0 +1,66 @@
+"""What a term of the heat balance can do, and the audit of heat (docs/theory.md §3.4)."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from cutsim.base.terms import Term
+from cutsim.fields.temperature import Temperature
+
+#: Entries of the heat audit: where heat comes from, and what becomes of it.
+GAINED = ("friction", "fracture", "source", "inflow")
+SPENT = ("stored", "outflow")
+
+
+class HeatTerm(Term):
+    """A term of the heat balance: `residual` is tested with a temperature, and is heat going in minus coming out.
+
+    Args:
+        temperature: The temperature.
+        name: Name in messages and columns of the history.
+    """
+
+    def __init__(self, temperature: Temperature, name: str) -> None:
+        self.temperature, self.state, self.name = temperature, temperature.state, name
+
+    def heat(self) -> dict[str, float]:
+        """Heat of the trial step by entry of the audit [energy]; a negative outflow is an inflow. Collective."""
+        return {}
+
+
+@dataclass(frozen=True)
+class HeatBalance:
+    """Heat since the start of a run [energy].
+
+    Attributes:
+        entries: Heat from friction, fracture and sources, heat that has come in through boundaries and tools; heat
+            stored in bodies and interfaces, and heat that has left through boundaries and tools.
+        scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with.
+    """
+
+    entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys((*GAINED, *SPENT), 0.0))
+    scale: float = 0.0
+
+    def advance(self, heats: Iterable[Mapping[str, float]]) -> "HeatBalance":
+        """Audit after a step.
+
+        Args:
+            heats: Contributions of the terms to the step.
+        """
+        entries = dict(self.entries)
+        for contribution in heats:
+            for name, value in contribution.items():
+                inward = name == "outflow" and value < 0
+                entries["inflow" if inward else name] += abs(value) if inward else value
+        turnover = max(sum(abs(entries[name]) for name in names) for names in (GAINED, SPENT))
+        return replace(self, entries=entries, scale=max(self.scale, turnover))
+
+    @property
+    def closure(self) -> float:
+        """(heat gained − stored − left) / largest turnover so far [–]."""
+        gap = sum(self.entries[name] for name in GAINED) - sum(self.entries[name] for name in SPENT)
+        return gap / self.scale if self.scale > 0 else 0.0
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Columns of the history row: name → (value, kind of quantity)."""
+        columns = {f"heat_{name}": (value, "energy") for name, value in self.entries.items()}
+        return columns | {"heat_closure": (self.closure, "one")}

@@ -1,0 +1,175 @@
+"""Heat exchange between two surfaces at their integration points: fluxes, interface temperature, entropy."""
+
+import logging
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
+from cutsim.base.parameters import with_constants
+from cutsim.fields.points import FacetPoints, Values
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.contact_heat import HeatLaw
+
+logger = logging.getLogger(__name__)
+
+# negative contact dissipation down to this fraction of the largest one is rounding
+_ROUNDING = 1e-9
+
+
+class HeatExchange:
+    """Exchange of heat between two surfaces, '+' and '−', and the interface between them.
+
+    Args:
+        temperature: The temperature.
+        points: Integration points.
+        law: Law of exchange.
+        plus: Temperature of the '+' surface, as it enters a form over the points.
+        minus: Temperature of the '−' surface.
+        name: Name in messages.
+        weight: Part of the area that takes part: heat, flows and entropy are multiplied by it.
+
+    Attributes:
+        fluxes: q⁺ and q⁻ out of the surfaces, for forms [power/area].
+    """
+
+    def __init__(
+        self,
+        temperature: Temperature,
+        points: FacetPoints,
+        law: HeatLaw,
+        plus: Expr,
+        minus: Expr,
+        name: str,
+        weight: float = 1.0,
+    ) -> None:
+        self.points, self.law, self.name, self._weight = points, law, name, weight
+        self._zero, self._dt = temperature.absolute_zero, temperature.state.dt
+        self._pressure, self._source, self._contact = (points.function() for _ in range(3))
+        pressure, source, contact = (points.at(f) for f in (self._pressure, self._source, self._contact))
+        symbolic = with_constants(temperature.state.mesh, law)
+        q_plus, q_minus, mixed = symbolic.exchange(pressure, plus, minus, source, contact, self._dt)
+        self.fluxes = q_plus, q_minus
+        fields = {"flux_plus": q_plus, "flux_minus": q_minus, "temperature": mixed}
+        self._evaluate = points.evaluator(fields | {"temperature_plus": plus, "temperature_minus": minus})
+        self._friction = self._fracture = np.zeros_like(points.weights)
+        self._entropy = self._entropy_old = 0.0
+        self._start()
+
+    def _start(self) -> None:
+        """The interface starts with the mean temperature of the surfaces, without flux."""
+        values = self._evaluate()
+        mean = np.asarray(0.5 * (values["temperature_plus"] + values["temperature_minus"]))
+        self.values: dict[str, Values] = {
+            **values,
+            **dict.fromkeys(("flux_plus", "flux_minus", "dissipation"), np.zeros_like(mean)),
+            "temperature": mean,
+        }
+        self._values_old = self.values
+        self.points.set(self._contact, mean)
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+        """Map from facets of the mesh to the mesh of the points."""
+        return self.points.entity_maps
+
+    def begin(self, pressure: Values, friction: Values, fracture: Values) -> None:
+        """Take over what the mechanical step has found, all per reference area.
+
+        Args:
+            pressure: Contact pressure [stress].
+            friction: Heat from friction in the step [energy/area].
+            fracture: Heat from fracture in the step [energy/area].
+        """
+        self._friction, self._fracture = friction, fracture
+        self.points.set(self._pressure, pressure)
+        self.points.set(self._source, np.asarray((friction + fracture) / float(self._dt.value), dtype=np.float64))
+
+    def evaluate(self) -> None:
+        """Fluxes, interface temperature, contact dissipation and entropy of the trial step. Collective."""
+        values = self._evaluate()
+        values["dissipation"] = self._dissipation(values)
+        flux_plus, flux_minus, zero = values["flux_plus"], values["flux_minus"], self._zero
+        kept = flux_plus + flux_minus + self.points.get(self._source)
+        entropy = kept / (values["temperature"] - zero)
+        entropy -= flux_plus / (values["temperature_plus"] - zero) + flux_minus / (values["temperature_minus"] - zero)
+        self._entropy = self._entropy_old + float(self._dt.value) * self._integral(entropy)
+        self.values = values
+        least, most = self.least_dissipation(), self.points.maximum(np.abs(values["dissipation"]))
+        if least < -_ROUNDING * most:
+            logger.warning("%s: contact dissipation %.3g < 0 at a point", self.name, least)
+
+    def _dissipation(self, values: Mapping[str, Values]) -> Values:
+        """q⁺ (T⁺ − T_c)/T⁺ + q⁻ (T⁻ − T_c)/T⁻ with absolute temperatures (thesis 4.62)."""
+        total = np.zeros_like(self.points.weights)
+        for side in ("plus", "minus"):
+            T = values[f"temperature_{side}"]
+            total += values[f"flux_{side}"] * (T - values["temperature"]) / (T - self._zero)
+        # heat that is given to the surfaces without a way through the interface meets no drop of temperature
+        return np.where(self.law.conducts(self.points.get(self._pressure)), total, 0.0)
+
+    def heat(self) -> dict[str, float]:
+        """Heat generated, and stored by the interface, in the trial step [energy]. Collective."""
+        rise = self.values["temperature"] - self.points.get(self._contact)
+        return {
+            "friction": self._integral(self._friction),
+            "fracture": self._integral(self._fracture),
+            "stored": self.law.capacity * self._integral(rise) if self.law.capacity else 0.0,
+        }
+
+    def flow(self, side: str) -> float:
+        """Heat flow out of a surface, side "plus" or "minus" [power]. Collective."""
+        return self._integral(self.values[f"flux_{side}"])
+
+    def _integral(self, values: Values) -> float:
+        return self._weight * self.points.integral(values)
+
+    def least_dissipation(self) -> float:
+        """Least contact dissipation at a point in the trial step [power/area]. Collective."""
+        return -self.points.maximum(-self.values["dissipation"])
+
+    @property
+    def entropy(self) -> float:
+        """Entropy produced since the start, the trial step included [energy/temperature]."""
+        return self._entropy
+
+    def point_values(self, name: str) -> Values:
+        """Trial values at the integration points, shape (local facets, points).
+
+        Args:
+            name: "flux_plus", "flux_minus" (out of the surfaces), "temperature" (of the interface),
+                "temperature_plus", "temperature_minus" or "dissipation" (of heat contact, thesis 4.62).
+
+        Raises:
+            ValueError: The name is unknown.
+        """
+        require("name", name, name in self.values, f"one of {', '.join(self.values)}")
+        return self.values[name]
+
+    def rollback(self) -> None:
+        """Forget the trial step."""
+        self.values, self._entropy = self._values_old, self._entropy_old
+
+    def commit(self) -> None:
+        """Adopt interface temperature and entropy."""
+        self.points.set(self._contact, self.values["temperature"])
+        self._values_old, self._entropy_old = self.values, self._entropy
+
+
+def contact_columns(name: str, exchanges: Sequence[HeatExchange]) -> dict[str, tuple[float, str]]:
+    """Columns of the history for the contact of two surfaces, see `cutsim.base.terms.Term.record`. Collective.
+
+    Args:
+        name: Name in the columns.
+        exchanges: All exchanges between the surfaces.
+    """
+    hottest = max(e.points.maximum(e.values["temperature"]) for e in exchanges)
+    least = min(e.least_dissipation() for e in exchanges)
+    return {
+        f"{name}_temperature_max": (hottest, "temperature"),
+        f"{name}_contact_dissipation_min": (least, "flux"),
+        f"{name}_entropy": (sum(e.entropy for e in exchanges), "entropy"),
+    }

@@ -1,0 +1,127 @@
+"""Heat between the points of one surface and their partners on another (docs/theory.md §3.4, §3.5)."""
+
+import basix
+import numpy as np
+import ufl
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.assembly import add_blocks
+from cutsim.fields.points import Values
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.contact_heat import ContactHeat
+from cutsim.heat.exchange import HeatExchange
+from cutsim.pairs.outer_surface import OuterSurface, SharedSurface
+from cutsim.pairs.pairing import Array, Indices
+from cutsim.pairs.surface_pass import SurfacePass
+
+
+class HeatPass:
+    """Exchange of heat at the points of a slave surface. Every method is collective.
+
+    The flux q⁺ leaves the slave at its points and q⁻ the master where the points meet it.  Both follow from the two
+    temperatures by the law of a crack: these are functions of the points, which are found beforehand.  A point without
+    a partner faces itself: nothing flows, and what it may still dissipate is kept by the slave.
+
+    Args:
+        temperature: The temperature.
+        contact: The pass of the mechanical pair.
+        master: Local facets of its master surface, ghosts included.
+        law: Law of exchange, '+' being the slave.
+        name: Name in messages.
+
+    Attributes:
+        contact: The pass of the mechanical pair.
+        exchange: What is known of heat at the points.
+    """
+
+    def __init__(
+        self,
+        temperature: Temperature,
+        contact: SurfacePass,
+        master: NDArray[np.int32],
+        law: ContactHeat,
+        name: str,
+    ) -> None:
+        self.contact, self._temperature, self._fraction = contact, temperature, law.fracture_fraction
+        points, kinematics = contact.points, contact.kinematics
+        self._slave = OuterSurface(temperature.space, kinematics.slave.facets)
+        self._master = SharedSurface(OuterSurface(temperature.space, master))
+        places = basix.make_quadrature(self._slave.shape.element.cell_type, points.degree)[0]
+        self._own_values = np.tile(self._slave.shape.values(places)[0], (len(self._slave.facets), 1))
+        self._facets: Indices = np.repeat(np.arange(len(self._slave.facets)), len(places))
+        self._pair()
+        self._faces = points.function(2)
+        self._feel()
+        faces = ufl.variable(points.at(self._faces))
+        self.exchange = HeatExchange(temperature, points, law, faces[0], faces[1], name, contact.weight)
+        fluxes = ufl.as_vector(self.exchange.fluxes)
+        rates = ufl.diff(fluxes, faces)
+        flat = ufl.as_vector([rates[i, j] for i in range(2) for j in range(2)])
+        self._linear = points.evaluator({"fluxes": fluxes, "rates": flat})
+
+    def _pair(self) -> None:
+        """Nodes on which each point acts and their shares: of its own facet, then of that which it faces."""
+        hits = self.contact.partners().hits
+        own = self._slave.global_nodes[self._facets]
+        faced, values = own.copy(), self._own_values.copy()
+        faced[hits.points] = self._master.global_nodes[hits.facets]
+        values[hits.points] = self._master.shape.values(hits.xi)[0]
+        none = np.zeros_like(values)
+        self._hits, self._nodes = hits, np.hstack([own, faced])
+        # shape (points, faces, nodes)
+        self._shares = np.stack([np.hstack([self._own_values, none]), np.hstack([none, values])], axis=1)
+
+    def _at_faces(self, field: Array) -> Array:
+        """Values of a field over the local dofs on both faces, shape (points, 2)."""
+        own = self._slave.gather(field)[self._facets, :, 0]
+        faced = own.copy()
+        faced[self._hits.points] = self._master.gather(field)[self._hits.facets, :, 0]
+        return np.asarray(np.einsum("nfa,na->nf", self._shares, np.hstack([own, faced])))
+
+    def _feel(self) -> None:
+        """Bring the present temperature to the points."""
+        points, values = self.contact.points, self._at_faces(self._temperature.value.x.array)
+        points.set(self._faces, values.reshape(*points.weights.shape, 2))
+
+    def begin(self) -> None:
+        """Take over partners, pressure and dissipation of the mechanical step."""
+        self._pair()
+        history, slip = self.contact.history, self.contact.slip
+        none: Values = np.zeros_like(self.contact.points.weights)
+        friction = none if slip is None else slip.dissipation()
+        self.exchange.begin(history.trial["pressure"], friction, self._fraction * history.dissipation())
+
+    def evaluate(self) -> None:
+        """Fluxes, interface temperature and entropy of the trial step."""
+        self._feel()
+        self.exchange.evaluate()
+
+    def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
+        """Add the heat that leaves the bodies, as `cutsim.base.terms.Term.add_forces`."""
+        self._feel()
+        fluxes, rates = self._law()
+        if along is not None:
+            fluxes = fluxes + np.einsum("nfg,ng->nf", rates, self._at_faces(along))
+        forces = np.einsum("n,nf,nfa->na", self.contact.weights, fluxes, self._shares)
+        b.setValues(self._nodes.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add the tangent, as `cutsim.base.terms.Term.add_tangent`."""
+        rates = self._law()[1]
+        rows = np.flatnonzero(rates.any(axis=(1, 2)) & (self.contact.weights > 0))
+        weighted, shares = self.contact.weights[rows, None, None] * rates[rows], self._shares[rows]
+        add_blocks(A, self._nodes[rows], shares.transpose(0, 2, 1) @ weighted @ shares)
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros, as `cutsim.base.terms.Term.add_pattern`."""
+        near = [facets[self._slave.owned[self.contact.kinematics.near[0]]] for facets in self.contact.kinematics.near]
+        own = self._slave.global_nodes
+        facing = np.hstack([own[near[0]], self._master.global_nodes[near[1]]])
+        for nodes in (own[self._slave.owned], facing):
+            add_blocks(A, nodes, np.zeros((*nodes.shape, nodes.shape[1])))
+
+    def _law(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Fluxes (points, 2) at the temperatures that were felt last, and their rates with these (points, 2, 2)."""
+        values = self._linear()
+        return values["fluxes"].reshape(-1, 2), values["rates"].reshape(-1, 2, 2)

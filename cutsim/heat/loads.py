@@ -1,0 +1,195 @@
+"""Heat through the boundary: given flux, convection, given temperature. All areas are those of the reference."""
+
+import math
+from abc import ABC, abstractmethod
+
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem
+from numpy.typing import NDArray
+
+from cutsim.base.assembly import integrate
+from cutsim.base.checks import require
+from cutsim.base.compat import form
+from cutsim.base.kinematics import Expr
+from cutsim.base.parameters import History, Schedule
+from cutsim.fields.space import locate_dofs
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.balance import HeatTerm
+
+
+class _SurfaceHeat(HeatTerm, ABC):
+    """Heat through a part of the boundary, `_influx` per reference area; it follows one number that varies in time."""
+
+    def __init__(
+        self, temperature: Temperature, facets: NDArray[np.int32], value: float | History, name: str, corners: tuple
+    ) -> None:
+        super().__init__(temperature, name)
+        self._corners = corners
+        self._ds = self.state.measures.exterior(facets)
+        self._value = Schedule(self.state.mesh, value)
+        self._flow = form(self._influx() * self._ds)
+
+    @abstractmethod
+    def _influx(self) -> Expr:
+        """Heat flux into the body [power/area]."""
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which the number has a kink."""
+        return self._corners
+
+    def residual(self, w: Expr) -> ufl.Form:
+        """Minus the heat that flows in."""
+        return -self._influx() * w * self._ds
+
+    def begin(self, time: float) -> None:
+        """Set the number to its value at a time."""
+        self._value.begin(time)
+
+    def heat_flow(self) -> float:
+        """Heat that flows into the body at the trial temperature [power]. Collective."""
+        return integrate(self._flow)
+
+    def heat(self) -> dict[str, float]:
+        """Heat that left in the step. Collective."""
+        return {"outflow": -self.heat_flow() * float(self.state.dt.value)}
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Heat flow into the body. Collective."""
+        return {f"{self.name}_heat_flow": (self.heat_flow(), "power")}
+
+    def rollback(self) -> None:
+        """Set the number back to the start of the step."""
+        self._value.begin(self.state.time_old)
+
+
+class HeatFlux(_SurfaceHeat):
+    """Given heat flux on a part of the boundary.
+
+    Args:
+        temperature: The temperature.
+        facets: Local exterior facets.
+        flux: Heat flux into the body per reference area, a number or a function of time [power/area].
+        name: Name in messages and output.
+        corners: Times at which the flux jumps or has a kink.
+
+    Raises:
+        ValueError: There is no such facet.
+    """
+
+    def __init__(
+        self,
+        temperature: Temperature,
+        facets: NDArray[np.int32],
+        flux: float | History,
+        *,
+        name: str = "flux",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        super().__init__(temperature, facets, flux, name, corners)
+
+    def _influx(self) -> Expr:
+        return self._value.constant
+
+
+class Convection(_SurfaceHeat):
+    """Heat exchange with the surroundings, flux h (T_∞ − T) into the body per reference area.
+
+    Args:
+        temperature: The temperature.
+        facets: Local exterior facets.
+        coefficient: Heat transfer coefficient h ≥ 0 [power/(area·temperature)].
+        ambient: Temperature T_∞ of the surroundings, a number or a function of time [temperature].
+        name: Name in messages and output.
+        corners: Times at which the ambient temperature jumps or has a kink.
+
+    Raises:
+        ValueError: There is no such facet, the coefficient is negative, or the surroundings are below absolute zero.
+    """
+
+    def __init__(
+        self,
+        temperature: Temperature,
+        facets: NDArray[np.int32],
+        coefficient: float,
+        ambient: float | History,
+        *,
+        name: str = "convection",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        require("coefficient", coefficient, 0 <= coefficient < math.inf, ">= 0")
+        self._coefficient = fem.Constant(temperature.state.mesh, default_scalar_type(coefficient))
+        super().__init__(temperature, facets, ambient, name, corners)
+        temperature.check("ambient", self._value.value)
+
+    def begin(self, time: float) -> None:
+        """Set the temperature of the surroundings to its value at a time.
+
+        Raises:
+            ValueError: It is below absolute zero.
+        """
+        super().begin(time)
+        self.temperature.check("ambient", self._value.value)
+
+    def _influx(self) -> Expr:
+        return self._coefficient * (self._value.constant - self.temperature.value)
+
+
+class PrescribedTemperature:
+    """Given temperature on some facets (or vertices, or cells), with the heat flow it takes.
+
+    On a crack it holds all its sides.
+
+    Args:
+        temperature: The temperature.
+        entities: Local mesh entities.
+        value: Temperature, a number or a function of time [temperature].
+        name: Name in the history, None to leave the heat flow out of it.
+        dim: Dimension of the entities; facets by default.
+        corners: Times at which the temperature jumps or has a kink.
+
+    Raises:
+        ValueError: No entity is found on any rank, or the temperature is below absolute zero.
+    """
+
+    def __init__(
+        self,
+        temperature: Temperature,
+        entities: NDArray[np.int32],
+        value: float | History,
+        *,
+        name: str | None = None,
+        dim: int | None = None,
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        mesh, V = temperature.space.mesh, temperature.space
+        self.name, self.temperature, self.corners = name, temperature, corners
+        dofs = locate_dofs(V, mesh.topology.dim - 1 if dim is None else dim, entities)
+        self._dofs = dofs[dofs < V.dofmap.index_map.size_local]
+        found = mesh.comm.allreduce(len(self._dofs))
+        require("entities", found, found > 0, f"entities that carry dofs (prescribed temperature {name!r})")
+        self._value = Schedule(mesh, value)
+        temperature.check("value", self._value.value)
+        self.bc = fem.dirichletbc(self._value.constant, dofs, V)
+
+    def begin(self, time: float) -> None:
+        """Set the temperature to its value at a time.
+
+        Raises:
+            ValueError: It is below absolute zero.
+        """
+        self._value.begin(time)
+        self.temperature.check("value", self._value.value)
+
+    def heat_flow(self, residual: NDArray[np.float64]) -> float:
+        """Heat flow into the body [power]. Collective.
+
+        Args:
+            residual: Owned entries of heat stored minus supplied, per time, at the nodes.
+        """
+        return float(self.temperature.space.mesh.comm.allreduce(float(residual[self._dofs].sum())))
+
+    def rollback(self) -> None:
+        """Set the temperature back to the start of the step."""
+        self._value.begin(self.temperature.state.time_old)

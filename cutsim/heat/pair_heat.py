@@ -1,0 +1,84 @@
+"""Heat between two surfaces that find each other and slide far (docs/theory.md §3.4, §3.5)."""
+
+from dataclasses import replace
+
+from cutsim.base.checks import require
+from cutsim.base.terms import AssembledTerm
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.balance import HeatTerm
+from cutsim.heat.contact_heat import ContactHeat
+from cutsim.heat.exchange import contact_columns
+from cutsim.heat.heat_pass import HeatPass
+from cutsim.pairs.surface_pair import SurfacePair
+
+
+class PairHeat(AssembledTerm[HeatPass], HeatTerm):
+    """Heat exchange across a pair of surfaces, with the dissipation of their friction and bond as its source.
+
+    Pressure, partners and dissipation are those of the mechanical step, per reference area of the slave.  The interface
+    and its temperature move with the slave.  In two passes each surface is slave once, with its share of the area.
+
+    Args:
+        temperature: The temperature, on a space of degree 1 or 2.
+        pair: The pair.
+        law: Law of exchange, '+' being the slave surface and '−' the master.
+        name: Name in messages and output; by default that of the pair.
+
+    Attributes:
+        passes: The exchange of each pass of the pair.
+
+    Raises:
+        ValueError: The temperature has another state than the pair, or is of higher degree.
+    """
+
+    def __init__(
+        self, temperature: Temperature, pair: SurfacePair, law: ContactHeat, *, name: str | None = None
+    ) -> None:
+        super().__init__(temperature, name or pair.name)
+        require("pair", pair.name, pair.state is temperature.state, "a pair made with the state of the temperature")
+        self.pair, self.law = pair, law
+        swapped = replace(law, gamma_plus=law.gamma_minus, gamma_minus=law.gamma_plus)
+        self.passes = tuple(
+            HeatPass(temperature, contact, master, side, self.name)
+            for contact, master, side in zip(pair.passes, pair.facets[::-1], (law, swapped), strict=False)
+        )
+
+    @property
+    def pattern(self) -> int:
+        """Number of the sparsity pattern."""
+        return self.pair.pattern
+
+    def begin(self, time: float) -> None:
+        """Take over partners, pressure and dissipation of the mechanical step. Collective."""
+        for p in self.passes:
+            p.begin()
+
+    def evaluate(self) -> None:
+        """Fluxes, interface temperature and entropy of the trial step. Collective."""
+        for p in self.passes:
+            p.evaluate()
+
+    def heat(self) -> dict[str, float]:
+        """Heat generated and stored by the interface in the step. Collective."""
+        heats = [p.exchange.heat() for p in self.passes]
+        return {entry: sum(heat[entry] for heat in heats) for entry in heats[0]}
+
+    def flow(self, side: str) -> float:
+        """Heat flow out of a surface, side "plus" (slave) or "minus" (master) [power]. Collective."""
+        sides = (side, {"plus": "minus", "minus": "plus"}[side])
+        return sum(p.exchange.flow(s) for p, s in zip(self.passes, sides, strict=False))
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Heat flow out of slave and master, highest temperature, contact dissipation, entropy. Collective."""
+        flows = {f"{self.name}_heat_flow_{side}": (self.flow(side), "power") for side in ("plus", "minus")}
+        return flows | contact_columns(self.name, [p.exchange for p in self.passes])
+
+    def rollback(self) -> None:
+        """Forget the trial step."""
+        for p in self.passes:
+            p.exchange.rollback()
+
+    def commit(self) -> None:
+        """Adopt interface temperature and entropy."""
+        for p in self.passes:
+            p.exchange.commit()

@@ -1,0 +1,119 @@
+"""Heat between a rigid tool and the body it touches (docs/theory.md §3.4)."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import ufl
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
+from cutsim.base.parameters import History, Schedule
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.balance import HeatTerm
+from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
+from cutsim.heat.exchange import HeatExchange, contact_columns
+from cutsim.tools.tool_contact import ToolContact
+
+
+class ToolHeat(HeatTerm):
+    """Heat exchange with a rigid tool, with the dissipation of its friction as source.
+
+    Args:
+        temperature: The temperature of the body.
+        tool: The tool.
+        law: For a tool of given temperature a `ContactHeat` without capacity, '+' being the body and '−' the tool; or
+            an `AdiabaticTool`.
+        tool_temperature: Temperature of the tool, a number or a function of time [temperature]; not for an adiabatic
+            tool.
+        name: Name in messages and output; by default that of the tool.
+
+    Attributes:
+        exchanges: What is known of heat at the points of each surface the tool can touch.
+
+    Raises:
+        ValueError: The law has a capacity, or the tool's temperature is missing, superfluous or below absolute zero.
+    """
+
+    def __init__(
+        self,
+        temperature: Temperature,
+        tool: ToolContact,
+        law: ContactHeat | AdiabaticTool,
+        tool_temperature: float | History | None = None,
+        *,
+        name: str | None = None,
+    ) -> None:
+        super().__init__(temperature, name or tool.name)
+        given, adiabatic = tool_temperature is not None, isinstance(law, AdiabaticTool)
+        require("tool_temperature", tool_temperature, given != adiabatic, "given unless the tool is adiabatic")
+        require("law.capacity", law.capacity, law.capacity == 0, "0 for a tool")
+        self.tool = tool
+        self._tool_temperature = None if tool_temperature is None else Schedule(self.state.mesh, tool_temperature)
+        self._check()
+        self.exchanges = [
+            HeatExchange(temperature, patch.surface.points, law, body, self._opposite(body), self.name)
+            for patch in tool.patches
+            for body in [patch.surface.restrict(temperature.value)]
+        ]
+
+    def _opposite(self, body: Expr) -> Expr:
+        return body if self._tool_temperature is None else self._tool_temperature.constant
+
+    def _check(self) -> None:
+        if self._tool_temperature is not None:
+            self.temperature.check("tool_temperature", self._tool_temperature.value)
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+        """Maps from facets of the mesh to the points of the surfaces."""
+        return {mesh: cells for e in self.exchanges for mesh, cells in e.entity_maps.items()}
+
+    def residual(self, w: Expr) -> ufl.Form:
+        """Heat that leaves the body through the surfaces."""
+        parts = zip(self.exchanges, self.tool.patches, strict=True)
+        return sum((e.fluxes[0] * p.surface.restrict(w) * p.surface.measure for e, p in parts), start=ufl.Form([]))
+
+    def begin(self, time: float) -> None:
+        """Take over pressure and dissipation of the mechanical step. Collective.
+
+        Raises:
+            ValueError: The tool's temperature is below absolute zero.
+        """
+        if self._tool_temperature is not None:
+            self._tool_temperature.begin(time)
+            self._check()
+        for exchange, patch in zip(self.exchanges, self.tool.patches, strict=True):
+            exchange.begin(patch.pressure(), patch.dissipation(), np.zeros_like(exchange.points.weights))
+
+    def evaluate(self) -> None:
+        """Fluxes, temperature and entropy at the contact in the trial step. Collective."""
+        for exchange in self.exchanges:
+            exchange.evaluate()
+
+    def heat_flow(self) -> float:
+        """Heat that flows into the tool [power]. Collective."""
+        return -sum(e.flow("minus") for e in self.exchanges)
+
+    def heat(self) -> dict[str, float]:
+        """Heat from friction, and heat that left into the tool, in the step. Collective."""
+        friction = sum(e.heat()["friction"] for e in self.exchanges)
+        return {"friction": friction, "outflow": self.heat_flow() * float(self.state.dt.value)}
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Heat flow into the tool, highest temperature, contact dissipation and entropy at the contact. Collective."""
+        flow = {f"{self.name}_heat_flow": (self.heat_flow(), "power")}
+        return flow | contact_columns(self.name, self.exchanges)
+
+    def rollback(self) -> None:
+        """Forget the trial step."""
+        if self._tool_temperature is not None:
+            self._tool_temperature.begin(self.state.time_old)
+        for exchange in self.exchanges:
+            exchange.rollback()
+
+    def commit(self) -> None:
+        """Adopt the entropy."""
+        for exchange in self.exchanges:
+            exchange.commit()

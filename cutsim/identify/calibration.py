@@ -1,0 +1,125 @@
+"""Parameters of a material from stress–stretch tests."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.parameters import numbers, with_numbers
+from cutsim.identify.fitting import Bounds, Fit, Values, fit_model, require_pairs
+from cutsim.identify.response import Response, nominal_stress, unstable_stretches
+from cutsim.materials.elastic import Material
+from cutsim.results.plots import Curve, plot_curves
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class StressTest:
+    """Nominal stress measured against stretch.
+
+    Args:
+        path: "uniaxial", "equibiaxial" or "pure shear".
+        stretch: Stretches λ₁ = 1 + engineering strain.
+        stress: Nominal stress, force over initial area [stress].
+        weight: Factor on its residuals, such as one over the largest stress, where tests of different sizes shall count
+            alike.
+
+    Raises:
+        ValueError: There are not as many stresses as stretches, a number is not finite, or the weight is not positive.
+    """
+
+    path: str
+    stretch: NDArray[np.float64]
+    stress: NDArray[np.float64]
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        require_pairs("stretch", self.stretch, "stress", self.stress)
+        require("weight", self.weight, self.weight > 0, "> 0")
+
+
+@dataclass(frozen=True)
+class MaterialFit:
+    """A material fitted to tests.
+
+    Attributes:
+        material: The material with the fitted numbers.
+        fit: The numbers that were fitted, their intervals and the quality of the fit.
+        tests: The tests.
+        unstable: Path -> smallest and largest stretch, within those measured, at which the material fails Drucker's
+            criterion.
+    """
+
+    material: Material
+    fit: Fit
+    tests: tuple[StressTest, ...]
+    unstable: dict[str, tuple[float, float]]
+
+    def plot(self, path: Path | str, *, unit: str = "MPa", title: str = "") -> None:
+        """Plot data and fit. Call it on one rank.
+
+        Args:
+            path: The file; its suffix tells the format.
+            unit: Unit of stress.
+            title: Text above the plot.
+        """
+        curves = []
+        for test in self.tests:
+            fine = np.linspace(min(1.0, test.stretch.min()), test.stretch.max(), 100)
+            curves.append(Curve(fine, nominal_stress(self.material, test.path, fine), f"{test.path}, fit"))
+            curves.append(Curve(test.stretch, test.stress, f"{test.path}, measured", "."))
+        plot_curves(path, curves, xlabel="stretch [1]", ylabel=f"nominal stress [{unit}]", title=title)
+
+
+def fit_material(
+    guess: Material, vary: Sequence[str], tests: Sequence[StressTest], *, bounds: Bounds | None = None
+) -> MaterialFit:
+    """Fit numbers of an incompressible material to one or several tests at once by least squares.
+
+    A material that is unstable within the measured stretches is logged as a warning.
+
+    Args:
+        guess: Material with a first guess of the numbers, none zero, and the others fixed.
+        vary: Names of the numbers to fit, as in `cutsim.base.parameters.numbers`: ``"c1"``, ``"moduli[0]"``,
+            ``"matrix.young"``; or ``"moduli"`` for all of them.
+        tests: The tests.
+        bounds: Number -> lower and upper bound.
+
+    Raises:
+        ValueError: A name is unknown, the data do not determine a number, or the material refuses the result.
+    """
+    start = _varied(guess, vary)
+    require("tests", len(tests), len(tests) > 0, "at least one test")
+    response = Response(guess, [(test.path, test.stretch) for test in tests])
+    fit = fit_model(
+        response.stress,
+        start,
+        np.concatenate([test.stress for test in tests]),
+        weights=np.concatenate([np.full(len(test.stretch), test.weight) for test in tests]),
+        bounds=bounds,
+    )
+    material = with_numbers(guess, fit.values)
+    stretches = np.concatenate([[1.0], *(test.stretch for test in tests)])
+    unstable = unstable_stretches(material, float(stretches.min()), float(stretches.max()))
+    for path, (low, high) in unstable.items():
+        name = type(material).__name__
+        logger.warning("%s fails Drucker's criterion in %s at stretches from %.3g to %.3g", name, path, low, high)
+    return MaterialFit(material, fit, tuple(tests), unstable)
+
+
+def _varied(guess: Material, vary: Sequence[str]) -> Values:
+    """First guesses of the numbers that are to be fitted."""
+    known = numbers(guess)
+    start: Values = {}
+    for name in vary:
+        matching = {n: v for n, v in known.items() if n == name or n.startswith((f"{name}[", f"{name}."))}
+        require("vary", name, bool(matching), "one of " + ", ".join(known))
+        start |= matching
+    return start

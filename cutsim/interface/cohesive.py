@@ -1,0 +1,273 @@
+"""Cohesive laws: traction against displacement jump on a crack that is opening (docs/theory.md §3.1, 3.2).
+
+A law gives *secant* stiffnesses: T = k_n ⟨δ_n⟩ n + k_t δ_t.  Its memory is one scalar per point, κ, the largest
+value of the law's own loading measure ("demand") so far.  Loading follows the envelope, unloading and
+reloading the secant to the origin (thesis 4.22–4.25).
+"""
+
+from dataclasses import dataclass
+from math import e, sqrt
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+import ufl
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
+
+_AGREE = 1e-3  # relative disagreement of strength, opening and toughness that is still rounding
+
+
+@runtime_checkable
+class CohesiveLaw(Protocol):
+    """What a crack needs of a cohesive law; see docs/adding_a_cohesive_law.md."""
+
+    @property
+    def strength(self) -> float:
+        """Largest normal traction t_n [stress]."""
+
+    @property
+    def opening(self) -> float:
+        """Characteristic normal opening ε_n [length]; the mesh has to resolve the zone it implies."""
+
+    @property
+    def toughness(self) -> tuple[float, float]:
+        """Works of separation (φ_n, φ_t) in pure opening and pure sliding [force/length]."""
+
+    def demand(self, opening: Expr, sliding: Expr) -> Expr:
+        """Loading measure ≥ 0 of a jump; its maximum over time is the history κ."""
+
+    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffnesses (k_n, k_t) at a jump whose history, the present included, is κ."""
+
+    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
+        """Damage (D_n, D_t) in [0, 1], non-decreasing in κ."""
+
+
+def strength_and_opening(
+    strength: float | None, opening: float | None, toughness: float | None, factor: float, mode: str = ""
+) -> tuple[float, float]:
+    """Complete one mode of a law: toughness = factor · strength · opening.
+
+    Args:
+        strength: Largest traction [stress] or None.
+        opening: Characteristic opening [length] or None.
+        toughness: Work of separation [force/length] or None.
+        factor: Shape factor of the law [–].
+        mode: Prefix of the parameter names in messages.
+
+    Returns:
+        (strength, opening).
+
+    Raises:
+        ValueError: A value is not positive, fewer than two are given, or all three are and disagree.
+    """
+    given = {"strength": strength, "opening": opening, "toughness": toughness}
+    for name, value in given.items():
+        if value is not None:
+            require(f"{mode}{name}", value, value > 0, "> 0")
+    if strength is not None and opening is not None:
+        implied = factor * strength * opening
+        if toughness is not None and abs(toughness - implied) > _AGREE * implied:
+            raise ValueError(
+                f"{mode}strength = {strength:g}, {mode}opening = {opening:g} and {mode}toughness = {toughness:g} "
+                f"contradict each other: strength and opening imply a toughness of {implied:g} "
+                f"({factor:.6g} x strength x opening); give two of the three"
+            )
+        return strength, opening
+    if toughness is not None and strength is not None:
+        return strength, toughness / (factor * strength)
+    if toughness is not None and opening is not None:
+        return toughness / (factor * opening), opening
+    raise ValueError(f"give two of {mode}strength, {mode}opening and {mode}toughness; got {given}")
+
+
+@dataclass(frozen=True)
+class Exponential:
+    """Exponential law of the thesis (4.20), after van den Bosch, Schreurs and Geers.
+
+    T_n = t_n (δ_n/ε_n) exp(1 − δ_n/ε_n) exp(−δ_t²/ε_t²),
+    T_t = 2√(e/2) t_t (δ_t/ε_t) (1 + δ_n/ε_n) exp(−δ_n/ε_n) exp(−δ_t²/ε_t²).
+    T_n peaks at δ_n = ε_n with t_n, T_t at |δ_t| = ε_t/√2 with t_t.  For φ_n ≠ φ_t the work of a mixed path
+    depends on the path (there is no potential).
+
+    Args:
+        t_n: Normal strength [stress].
+        eps_n: Characteristic normal opening ε_n [length].
+        t_t: Tangential strength [stress].
+        eps_t: Characteristic sliding ε_t [length].
+    """
+
+    t_n: float
+    eps_n: float
+    t_t: float
+    eps_t: float
+
+    def __post_init__(self) -> None:
+        for name in ("t_n", "eps_n", "t_t", "eps_t"):
+            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+
+    @classmethod
+    def from_parameters(
+        cls,
+        *,
+        strength: float | None = None,
+        opening: float | None = None,
+        toughness: float | None = None,
+        shear_strength: float | None = None,
+        shear_opening: float | None = None,
+        shear_toughness: float | None = None,
+    ) -> "Exponential":
+        """Make the law from two of strength, opening and toughness in each mode.
+
+        Without any shear value the shear mode has the strength and the toughness of the opening mode.
+
+        Raises:
+            ValueError: Values are missing, not positive, or contradict each other.
+        """
+        t_n, eps_n = strength_and_opening(strength, opening, toughness, e)
+        if shear_strength is None and shear_opening is None and shear_toughness is None:
+            shear_strength, shear_toughness = t_n, e * t_n * eps_n
+        t_t, eps_t = strength_and_opening(shear_strength, shear_opening, shear_toughness, sqrt(e / 2), "shear_")
+        return cls(t_n, eps_n, t_t, eps_t)
+
+    @property
+    def strength(self) -> float:
+        """Largest normal traction t_n [stress]."""
+        return self.t_n
+
+    @property
+    def opening(self) -> float:
+        """Characteristic normal opening ε_n [length]."""
+        return self.eps_n
+
+    @property
+    def toughness(self) -> tuple[float, float]:
+        """Works of separation φ_n = e t_n ε_n and φ_t = √(e/2) t_t ε_t [force/length]."""
+        return e * self.t_n * self.eps_n, sqrt(e / 2) * self.t_t * self.eps_t
+
+    def demand(self, opening: Expr, sliding: Expr) -> Expr:
+        """Effective jump √(⟨δ_n⟩² + β² δ_t²) with β² = φ_t/φ_n (thesis 4.22)."""
+        phi_n, phi_t = self.toughness
+        # the floor keeps the direction of an unloaded jump defined; it is far below any opening that matters
+        return ufl.sqrt(opening**2 + phi_t / phi_n * sliding**2 + (1e-8 * self.eps_n) ** 2)
+
+    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffnesses at the jump scaled to the envelope by r = κ/δ_eff (thesis 4.24)."""
+        r = kappa / self.demand(opening, sliding)
+        normal = r * opening / self.eps_n
+        decay = ufl.exp(-normal - (r * sliding / self.eps_t) ** 2)
+        k_n = e * self.t_n / self.eps_n * decay
+        k_t = sqrt(2 * e) * self.t_t / self.eps_t * (1 + normal) * decay
+        return k_n, k_t
+
+    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
+        """Loss of strength in each pure mode after its peak (thesis 4.26, 4.27)."""
+        phi_n, phi_t = self.toughness
+        normal = kappa / self.eps_n
+        sliding = kappa / (ufl.sqrt(phi_t / phi_n) * self.eps_t)
+        D_n = 1 - normal * ufl.exp(1 - normal)
+        D_t = 1 - sqrt(2) * sliding * ufl.exp(0.5 - sliding**2)
+        return (
+            ufl.conditional(ufl.gt(normal, 1), D_n, 0.0),
+            ufl.conditional(ufl.gt(sliding, 1 / sqrt(2)), D_t, 0.0),
+        )
+
+
+@dataclass(frozen=True)
+class Bilinear:
+    """Bilinear mixed-mode law with the Benzeggagh–Kenane criterion (Camanho, Turon et al. 2006).
+
+    T = (1 − d) K δ with d the largest value so far of λ_f (λ − λ_0) / (λ (λ_f − λ_0)), λ the norm of the jump,
+    B = δ_t²/λ², λ_0² = δ_n0² + (δ_t0² − δ_n0²) B^η and λ_f = 2 (G_I + (G_II − G_I) B^η) / (K λ_0).
+
+    Args:
+        penalty: Stiffness K of the intact bond [stress/length].
+        t_n: Normal strength [stress].
+        G_I: Toughness in opening [force/length].
+        t_t: Shear strength [stress].
+        G_II: Toughness in sliding [force/length].
+        eta: Exponent η of the Benzeggagh–Kenane criterion [–].
+
+    Raises:
+        ValueError: A value is not positive, or K is so small that the bond would be broken before its peak.
+    """
+
+    penalty: float
+    t_n: float
+    G_I: float
+    t_t: float
+    G_II: float
+    eta: float = 2.0
+
+    def __post_init__(self) -> None:
+        for name in ("penalty", "t_n", "G_I", "t_t", "G_II", "eta"):
+            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+        least = max(self.t_n**2 / (2 * self.G_I), self.t_t**2 / (2 * self.G_II))
+        require("penalty", self.penalty, self.penalty > least, f"> strength²/(2 toughness) = {least:g}")
+
+    @property
+    def strength(self) -> float:
+        """Largest normal traction t_n [stress]."""
+        return self.t_n
+
+    @property
+    def opening(self) -> float:
+        """Normal opening G_I/(e t_n) of the exponential law with the same strength and toughness [length]."""
+        return self.G_I / (e * self.t_n)
+
+    @property
+    def toughness(self) -> tuple[float, float]:
+        """Works of separation (G_I, G_II) [force/length]."""
+        return self.G_I, self.G_II
+
+    def demand(self, opening: Expr, sliding: Expr) -> Expr:
+        """Damage d that this jump alone would cause, in [0, 1]."""
+        floor = (1e-8 * self.t_n / self.penalty) ** 2
+        square = opening**2 + sliding**2 + floor
+        jump = ufl.sqrt(square)
+        mix = ((sliding**2 + floor) / square) ** self.eta
+        onset = ufl.sqrt((self.t_n**2 + (self.t_t**2 - self.t_n**2) * mix) / self.penalty**2)
+        final = 2 * (self.G_I + (self.G_II - self.G_I) * mix) / (self.penalty * onset)
+        softening = final * (jump - onset) / (jump * (final - onset))
+        return ufl.conditional(ufl.lt(jump, onset), 0.0, ufl.conditional(ufl.gt(jump, final), 1.0, softening))
+
+    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffnesses (1 − κ) K in both directions."""
+        k = (1 - kappa) * self.penalty
+        return k, k
+
+    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
+        """The history itself: κ is the damage."""
+        return kappa, kappa
+
+
+def process_zone_element(law: CohesiveLaw, young: float) -> float:
+    """Largest element size that resolves the process zone of a law in a body [length].
+
+    0.4 ε in soft solids, whose strength is of the order of Young's modulus (measured on blade cuts); a twentieth of
+    Irwin's length E G/t² in stiff ones, where the zone is far longer than the opening.
+    """
+    return max(0.4 * law.opening, 0.05 * young * law.toughness[0] / law.strength**2)
+
+
+def separation_curve(law: CohesiveLaw, points: int = 400) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fraction of the toughness spent against the opening, in pure opening.
+
+    Args:
+        law: The law.
+        points: Points of the table.
+
+    Returns:
+        Openings from 0 to 40 ε_n [length], and the work of separation up to each over φ_n [–].
+    """
+    openings = 40 * law.opening * np.linspace(0, 1, points) ** 2
+
+    def traction(opening: float) -> float:
+        kappa = law.demand(opening, 0.0)
+        return float(law.stiffness(opening, 0.0, kappa)[0]) * opening
+
+    tractions = np.array([traction(float(d)) for d in openings])
+    work = np.concatenate([[0.0], np.cumsum(0.5 * (tractions[1:] + tractions[:-1]) * np.diff(openings))])
+    return openings, work / law.toughness[0]

@@ -1,0 +1,57 @@
+"""Contact laws: normal pressure against penetration (docs/theory.md §3, 4)."""
+
+from dataclasses import dataclass
+
+import ufl
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr, positive_part
+
+
+@dataclass(frozen=True)
+class PenaltyContact:
+    """Penalty contact p = ε_N ⟨penetration⟩, quadratic over the first part of the penetration.
+
+    A pressure with a kink makes Newton's method cycle between two states when one integration point toggles; the
+    quadratic start over a penetration of 2c removes the kink: p = ε s²/(4c) for 0 < s < 2c, ε (s − c) beyond.
+
+    Args:
+        stiffness: Penalty ε_N > 0 [stress/length].
+        blend: Half the width of the quadratic start, c ≥ 0 [length]; 0 gives the plain law.
+
+    Raises:
+        ValueError: A value is outside its range.
+    """
+
+    stiffness: float
+    blend: float = 0.0
+
+    def __post_init__(self) -> None:
+        require("stiffness", self.stiffness, self.stiffness > 0, "> 0")
+        require("blend", self.blend, self.blend >= 0, ">= 0")
+
+    @classmethod
+    def automatic(cls, young: float, h: float, factor: float = 10.0, blend: float = 0.0) -> "PenaltyContact":
+        """Penalty ε_N = factor · E/h from the neighbouring cells' Young's modulus and size."""
+        require("young", young, young > 0, "> 0")
+        require("h", h, h > 0, "> 0")
+        return cls(factor * young / h, blend)
+
+    def pressure(self, penetration: Expr) -> Expr:
+        """Contact pressure p ≥ 0 [stress] at a penetration (positive inside) [length]."""
+        s, c = penetration, self.blend
+        if c == 0:
+            return self.stiffness * positive_part(s)
+        quadratic = self.stiffness * s**2 / (4 * c)
+        return ufl.conditional(
+            ufl.lt(s, 0), 0.0, ufl.conditional(ufl.lt(s, 2 * c), quadratic, self.stiffness * (s - c))
+        )
+
+    def energy(self, penetration: Expr) -> Expr:
+        """Energy ∫ p dδ stored by the penalty [force/length]."""
+        s, c = penetration, self.blend
+        if c == 0:
+            return 0.5 * self.stiffness * positive_part(s) ** 2
+        quadratic = self.stiffness * s**3 / (12 * c)
+        linear = self.stiffness * (0.5 * (s - c) ** 2 + c**2 / 6)
+        return ufl.conditional(ufl.lt(s, 0), 0.0, ufl.conditional(ufl.lt(s, 2 * c), quadratic, linear))

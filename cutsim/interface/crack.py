@@ -1,0 +1,254 @@
+"""A crack: one law for closing and opening on predefined facets (docs/theory.md §1, 3; thesis 4.10, 4.41).
+
+Closed, the law is penalty contact; open, a cohesive law with irreversible damage.  '+' and '−' are fixed by region, the
+jump is δ = u⁻ − u⁺, the normal n points from '+' to '−', and the traction acts as T on the '+' face, as −T on the '−'
+face: T·n > 0 pulls them together.
+"""
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
+from cutsim.base.parameters import with_constants
+from cutsim.base.terms import Term
+from cutsim.fields.points import FacetPoints, Surface, Values
+from cutsim.fields.sizes import facet_size, normal_size
+from cutsim.fields.space import crack_measure_entities
+from cutsim.fields.state import State
+from cutsim.interface.cohesive import CohesiveLaw, process_zone_element
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.history import InterfaceHistory
+from cutsim.interface.law import Response, respond
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class CrackResponse(Response):
+    """The law of a crack at a displacement, with its kinematics.
+
+    Attributes:
+        jump: Displacement jump δ = u⁻ − u⁺ [length].
+        opening: δ·n [length].
+        slide: Tangential part of the jump, a vector [length].
+        cohesive: Cohesive traction on the '+' face, a vector [stress].
+        normal: Unit normal of the mid-surface, from '+' to '−'.
+    """
+
+    jump: Expr
+    opening: Expr
+    slide: Expr
+    cohesive: Expr
+    normal: Expr
+
+
+class Crack(Term):
+    """Modified contact on a set of interior facets of a cracked space.
+
+    Args:
+        state: Displacement (on a space that is cracked along the facets) and time.
+        facets: Local interior facets, ghosts included.
+        plus: The side called '+': its local cells (ghosts included) or a direction e with n⁺·e > 0.
+        law: Cohesive law; None for a crack that is already broken, with contact only.
+        young: Young's modulus of the softer neighbour, for the automatic penalty and the mesh check [stress].
+        name: Name in messages and output.
+        contact: Contact law of the closed crack; by default a penalty of 10 E/h.
+        penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
+        normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
+
+    Attributes:
+        points: Its integration points, with the facets in the order of all per-facet arrays.
+        history: What they remember.
+        entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
+        size: Mean size of the facets along the crack, their shortest edge [length].
+        normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
+
+    Raises:
+        ValueError: A parameter is outside its range, or the facets are not a crack of the mesh.
+    """
+
+    symmetric = False
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        plus: NDArray[np.int32] | tuple[float, ...],
+        law: CohesiveLaw | None = None,
+        *,
+        young: float,
+        name: str = "crack",
+        contact: PenaltyContact | None = None,
+        penetration: float | None = None,
+        normal: Literal["current", "reference"] = "current",
+    ) -> None:
+        require("young", young, young > 0, "> 0")
+        require("normal", normal, normal in ("current", "reference"), "'current' or 'reference'")
+        require("penetration", penetration, penetration is None or penetration > 0, "> 0 or None")
+        self.name, self.state, self.law = name, state, law
+        self._current = normal == "current"
+        self._allowed_penetration = penetration
+        self.entities = crack_measure_entities(state.mesh, facets, plus)
+        self.points = FacetPoints(
+            state.mesh, np.asarray(facets, dtype=np.int32), state.measures.interior(self.entities), interior=True
+        )
+        self.size = self.points.mean(facet_size(state.mesh, self.points.facets))
+        self.normal_size = self.points.mean(normal_size(state.mesh, self.points.facets))
+        self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
+        self._symbolic_law = None if law is None else with_constants(state.mesh, law)
+        self._symbolic_contact = with_constants(state.mesh, self.contact)
+        self._warn_coarse(young)
+        self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
+        self.history = InterfaceHistory(self.points)
+        self._point_values = self.points.evaluator(self._columns())
+
+    # -- virtual work ---------------------------------------------------------------------------------------------
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+        """Map from facets of the mesh to cells of the crack's submesh."""
+        return self.points.entity_maps
+
+    @property
+    def facet_energy(self) -> float:
+        """Energy that breaks a facet of mean size in opening; 0 without a law."""
+        return (
+            self.law.toughness[0] * self.points.mean(self.points.weights.sum(axis=1)) if self.law is not None else 0.0
+        )
+
+    def surface(self, side: Literal["+", "-"]) -> Surface:
+        """One face of the crack, for tool contact."""
+        return Surface(self.points, side)
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Virtual work ∫ T·(v⁻ − v⁺) dΓ₀ of cohesive traction and contact pressure."""
+        response = self.response(self.state.u)
+        traction = response.cohesive - response.pressure * response.normal
+        return ufl.inner(traction, displacement_jump(v)) * self.points.measure
+
+    def response(self, u: Expr) -> CrackResponse:
+        """The law at a displacement, restricted to the crack."""
+        N = ufl.FacetNormal(self.state.mesh)
+        n = midsurface_normal(u, N) if self._current else N("+")
+        jump = displacement_jump(u)
+        gap = ufl.dot(jump, n)
+        slide = jump - gap * n
+        multiplier = self.points.at(self.history.multiplier) if self._allowed_penetration else 0.0
+        fade = facing(u, N) if self._current else ufl.as_ufl(1.0)
+        kappa = self.points.at(self.history.kappa)
+        r = respond(self._symbolic_law, self._symbolic_contact, gap, slide, kappa, multiplier, fade)
+        return CrackResponse(**vars(r), jump=jump, opening=gap, slide=slide, cohesive=r.tension * n + r.shear, normal=n)
+
+    # -- history --------------------------------------------------------------------------------------------------
+
+    def _columns(self) -> dict[str, Expr]:
+        """What is known at each point, at the fraction s of the step's displacement increment."""
+        u_s = self.state.u_old + self._s * (self.state.u - self.state.u_old)
+        r = self.response(u_s)
+        increment = displacement_jump(self.state.u) - displacement_jump(self.state.u_old)
+        return {
+            "demand": r.demand,
+            "cohesive_power": ufl.dot(r.cohesive, increment),
+            "contact_power": -r.pressure * ufl.dot(r.normal, increment),
+            "stored": 0.5 * ufl.dot(r.cohesive, r.jump),
+            "damage": r.damage[0],
+            "opening": r.opening,
+            "sliding": r.sliding,
+            "pressure": r.pressure,
+        }
+
+    def _evaluate_at(self, s: float) -> dict[str, Values]:
+        self._s.value = s
+        return self._point_values()
+
+    def evaluate(self) -> None:
+        """Trial history, and the work of the step integrated along the path of the displacement. Collective."""
+        self.history.evaluate(self._evaluate_at)
+
+    def augment(self) -> bool:
+        """Uzawa step λ ← p (thesis 4.33) if a closed point is off by more than is allowed. Collective."""
+        if self._allowed_penetration is None:
+            return False
+        pressure = self._evaluate_at(1.0)["pressure"]
+        return self.history.augment(pressure, self.contact.stiffness * self._allowed_penetration)
+
+    def rollback(self) -> None:
+        """Restore the contact multiplier, and what is known at the points, of the committed state."""
+        self.history.rollback()
+
+    def commit(self) -> None:
+        """Adopt history, work and multiplier of the step."""
+        self.history.commit()
+
+    def energies(self) -> dict[str, float]:
+        """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""
+        return self.history.energies()
+
+    def damage_increment(self) -> float:
+        """Largest growth of damage at a point in the trial step. Collective."""
+        return self.history.damage_increment() if self.law is not None else 0.0
+
+    def diagnose(self) -> str | None:
+        """Say where the trial state of the last solve opens or closes most. Collective."""
+        values = self._evaluate_at(1.0)
+        opening, penetration = self.points.maximum(values["opening"]), self.points.maximum(-values["opening"])
+        return f"{self.name}: largest opening {opening:.3g}, largest penetration {max(penetration, 0.0):.3g}"
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
+        trial = self.history.trial
+        penetration = max(self.points.maximum(np.where(trial["pressure"] > 0, -trial["opening"], 0.0)), 0.0)
+        columns = {
+            f"{self.name}_opening": (self.points.maximum(self.history.trial["opening"]), "length"),
+            f"{self.name}_penetration": (penetration / self.normal_size, "one"),
+        }
+        if self.law is not None:
+            kind = self.state.facet_measure
+            columns[f"{self.name}_broken"] = (self.points.integral(self.history.trial["damage"]), kind)
+        return columns
+
+    def point_values(self, name: str) -> Values:
+        """Trial values at the integration points, shape (local crack facets, points).
+
+        Args:
+            name: "damage", "opening", "sliding", "pressure", "stored" or "dissipated".
+
+        Raises:
+            ValueError: The name is unknown.
+        """
+        if name == "dissipated":
+            return self.history.dissipated()
+        trial = self.history.trial
+        require("name", name, name in trial, f"one of {(*trial, 'dissipated')}")
+        return trial[name]
+
+    def dissipation(self) -> Values:
+        """Fracture dissipation of the trial step at the integration points [energy per reference area]."""
+        return self.history.dissipation()
+
+    def facet_mean(self, name: str) -> Values:
+        """Mean over each local crack facet of a point quantity; arguments as `point_values`."""
+        return self.points.facet_mean(self.point_values(name))
+
+    def frame(self, u: Expr) -> tuple[Expr, ...]:
+        """Unit tangents of the mid-surface that turn with it: one in 2-D, two in 3-D."""
+        return surface_frame(u, self.state.mesh, self.response(u).normal, current=self._current)
+
+    def _warn_coarse(self, young: float) -> None:
+        if self.law is None:
+            return
+        allowed = process_zone_element(self.law, young)
+        if self.size > allowed:
+            logger.warning(
+                "%s: facets of %.3g do not resolve the process zone (opening %.3g): use %.3g or less",
+                self.name, self.size, self.law.opening, allowed,
+            )  # fmt: skip

@@ -1,0 +1,116 @@
+"""Friction between the faces of a crack (docs/theory.md §3.3; thesis 4.50–4.55)."""
+
+import logging
+from collections.abc import Mapping
+from typing import Literal
+
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr, displacement_jump
+from cutsim.base.terms import Term
+from cutsim.fields.points import Values
+from cutsim.interface.crack import Crack
+from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.slip import SlipHistory, completed
+
+logger = logging.getLogger(__name__)
+
+_AREAS = ("broken", "contact", "thesis")
+
+
+class CrackFriction(Term):
+    """Friction that resists the sliding of closed crack faces.
+
+    The traction is kept in components along tangents that turn with the crack, so that it is objective.  Its limit
+    comes from the contact pressure; by default it acts on the broken fraction D_t of the bond, beside the cohesive
+    traction of the rest (Alfano and Sacco 2006).
+
+    Args:
+        crack: The crack.
+        law: Friction law; without a tangential penalty of its own it takes that of the normal contact.
+        acts_on: "broken": on the broken fraction.  "contact": wherever the faces are pressed together, broken or not.
+            "thesis": as "contact", and the tension of the bond counts as pressure as in (4.52) of the thesis; an open
+            gap then rubs, which is physically wrong, so that a warning is given.
+        stick: If given, augmentation until no sticking facet slides more than this in a step, in the mean [length].
+        temperature: Temperature on a scalar space cracked like the displacement, for laws that depend on it; the hotter
+            side counts.
+
+    Raises:
+        ValueError: A parameter is outside its range.
+    """
+
+    symmetric = False
+
+    def __init__(
+        self,
+        crack: Crack,
+        law: FrictionLaw,
+        *,
+        acts_on: Literal["broken", "contact", "thesis"] = "broken",
+        stick: float | None = None,
+        temperature: fem.Function | None = None,
+    ) -> None:
+        require("acts_on", acts_on, acts_on in _AREAS, f"one of {', '.join(_AREAS)}")
+        require("stick", stick, stick is None or stick > 0, "> 0 or None")
+        if acts_on == "thesis":
+            logger.warning("%s: open faces rub (friction 'thesis'); use it for comparison only", crack.name)
+        self.crack, self.name = crack, f"{crack.name}_friction"
+        u = crack.state.u
+        response, self._frame = crack.response(u), crack.frame(u)
+        tension = ufl.dot(response.cohesive, response.normal) if acts_on == "thesis" else 0.0
+        hotter = None if temperature is None else ufl.max_value(temperature("+"), temperature("-"))
+        self._share = response.damage[1] if acts_on == "broken" else ufl.as_ufl(1.0)
+        self.slip = SlipHistory(
+            crack.state,
+            crack.points,
+            completed(law, crack.contact.stiffness),
+            ufl.as_vector([ufl.dot(response.jump, a) for a in self._frame]),
+            response.pressure + tension,
+            share=self._share,
+            tolerance=stick,
+            temperature=hotter,
+        )
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray]:
+        """Map from facets of the mesh to cells of the crack's submesh."""
+        return self.crack.entity_maps
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Virtual work ∫ t·(v⁻ − v⁺) dΓ₀; the traction acts as t on the '+' face."""
+        traction = sum(self.slip.traction[i] * a for i, a in enumerate(self._frame))
+        return self._share * ufl.dot(traction, displacement_jump(v)) * self.crack.points.measure
+
+    def augment(self) -> bool:
+        """Uzawa step if a facet that sticks slides by more than is allowed. Collective."""
+        return self.slip.augment()
+
+    def evaluate(self) -> None:
+        """Slip and dissipation of the trial step. Collective."""
+        self.slip.evaluate()
+
+    def energies(self) -> dict[str, float]:
+        """Energy dissipated so far, and stored in the tangential penalty. Collective."""
+        return self.slip.energies()
+
+    def dissipation(self) -> Values:
+        """Friction dissipation of the trial step at the points of the crack [energy per reference area]."""
+        return self.slip.dissipation()
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Areas that stick and slip under pressure. Collective."""
+        sticks, slips = self.slip.areas()
+        kind = self.crack.state.facet_measure
+        return {f"{self.crack.name}_sticking": (sticks, kind), f"{self.crack.name}_slipping": (slips, kind)}
+
+    def rollback(self) -> None:
+        """Forget the slip of the trial step."""
+        self.slip.rollback()
+
+    def commit(self) -> None:
+        """Adopt the slip of the step."""
+        self.slip.commit()

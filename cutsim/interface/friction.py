@@ -1,0 +1,126 @@
+"""Friction laws: traction against slip and pressure (docs/theory.md §3.3).
+
+A law sees the slip since the point at which its traction would vanish, the *anchor*, and resists it.  After a step the
+anchor follows: what the law does not hold elastically has slipped for good.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import ufl
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr, positive_part
+
+# far below any slip, so that directions are differentiable at rest [length]
+_REST = 1e-20
+# relative excess over Coulomb's limit at which a point slips: at the limit itself rounding would decide
+_AT_LIMIT = 1e-12
+
+
+@runtime_checkable
+class FrictionLaw(Protocol):
+    """What friction needs of a law."""
+
+    @property
+    def compliance(self) -> float:
+        """Elastic slip per traction [length/stress]; 0 if nothing is held elastically."""
+
+    def limit(self, pressure: Expr, temperature: Expr | None) -> Expr:
+        """Largest traction without viscosity, μ p [stress]."""
+
+    def traction(self, slip: Expr, pressure: Expr, dt: Expr, temperature: Expr | None) -> Expr:
+        """Traction along the slip since the anchor [stress]; the sliding body feels its opposite."""
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """Coulomb friction by return mapping (thesis 4.50–4.55).
+
+    Trial traction t* = ε_T s with the slip s since the anchor; stick if |t*| ≤ μ p, else t = μ p t*/|t*|.  With a
+    viscosity η the traction exceeds the limit by η times the rate of slip (viscoplastic regularisation, thesis B.20).
+    With two temperatures the coefficient falls as μ(T) = μ (T_d − T)²/(T_d − T_ref)² up to T_d, where it vanishes
+    (B.21), T being that of the hotter side.
+
+    Args:
+        mu: Friction coefficient μ ≥ 0 at the reference temperature [–].
+        stiffness: Tangential penalty ε_T > 0 [stress/length]; None for that of the normal contact.
+        viscosity: η ≥ 0 [stress·time/length].
+        T_ref: Reference temperature, None if the coefficient is constant.
+        T_damage: Temperature T_d > T_ref at which friction vanishes, None if the coefficient is constant.
+
+    Raises:
+        ValueError: A value is outside its range, or only one temperature is given.
+    """
+
+    mu: float
+    stiffness: float | None = None
+    viscosity: float = 0.0
+    T_ref: float | None = None
+    T_damage: float | None = None
+
+    def __post_init__(self) -> None:
+        require("mu", self.mu, self.mu >= 0, ">= 0")
+        require("stiffness", self.stiffness, self.stiffness is None or self.stiffness > 0, "> 0 or None")
+        require("viscosity", self.viscosity, self.viscosity >= 0, ">= 0")
+        both = (self.T_ref is None) == (self.T_damage is None)
+        require("T_damage", self.T_damage, both, "given together with T_ref, or neither")
+        if self.T_ref is not None and self.T_damage is not None:
+            require("T_damage", self.T_damage, self.T_damage > self.T_ref, f"> T_ref = {self.T_ref}")
+
+    @property
+    def compliance(self) -> float:
+        """Elastic slip per traction 1/ε_T [length/stress]."""
+        assert self.stiffness is not None
+        return 1 / self.stiffness
+
+    def limit(self, pressure: Expr, temperature: Expr | None) -> Expr:
+        """Largest traction without viscosity, μ(T) p [stress]."""
+        if self.T_ref is None or self.T_damage is None:
+            return self.mu * pressure
+        require("temperature", temperature, temperature is not None, "a temperature: the coefficient depends on it")
+        left: Expr = self.T_damage - temperature  # type: ignore[operator]
+        share = positive_part(left) / (self.T_damage - self.T_ref)
+        return self.mu * share**2 * pressure
+
+    def traction(self, slip: Expr, pressure: Expr, dt: Expr, temperature: Expr | None) -> Expr:
+        """Traction along the slip since the anchor [stress]."""
+        size = ufl.sqrt(ufl.dot(slip, slip) + _REST**2)
+        trial, limit = self.stiffness * size, self.limit(pressure, temperature)
+        rate = self.viscosity / dt
+        sliding = limit + rate / (self.stiffness + rate) * (trial - limit)
+        stick = ufl.le(trial, (1 + _AT_LIMIT) * limit)
+        return ufl.conditional(stick, self.stiffness, sliding / size) * slip
+
+
+@dataclass(frozen=True)
+class SmoothCoulomb:
+    """Coulomb friction without stick, t = μ p s/√(|s|² + s₀²) with the slip s of the step.
+
+    Args:
+        mu: Friction coefficient μ ≥ 0 [–].
+        slip: Slip s₀ > 0 in one step below which the traction is proportional to the slip [length].
+
+    Raises:
+        ValueError: A value is outside its range.
+    """
+
+    mu: float
+    slip: float
+
+    def __post_init__(self) -> None:
+        require("mu", self.mu, self.mu >= 0, ">= 0")
+        require("slip", self.slip, self.slip > 0, "> 0")
+
+    @property
+    def compliance(self) -> float:
+        """Zero: nothing is held elastically."""
+        return 0.0
+
+    def limit(self, pressure: Expr, temperature: Expr | None) -> Expr:
+        """Largest traction μ p [stress]."""
+        return self.mu * pressure
+
+    def traction(self, slip: Expr, pressure: Expr, dt: Expr, temperature: Expr | None) -> Expr:
+        """Traction along the slip of the step [stress]."""
+        return self.mu * pressure * slip / ufl.sqrt(ufl.dot(slip, slip) + self.slip**2)

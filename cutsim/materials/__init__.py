@@ -1,0 +1,1 @@
+"""Strain energies of solids: a frozen dataclass of parameters each."""

@@ -1,0 +1,164 @@
+"""Partners of the points of a surface on another one, opening and slide between them (docs/theory.md §3.5)."""
+
+import basix
+import numpy as np
+
+from cutsim.fields.points import DEGREE
+from cutsim.pairs.outer_surface import Master, OuterSurface
+from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, project
+from cutsim.pairs.points import Pairs, Points
+
+#: Degree of the quadrature on a slave surface, by that of the displacement: master facets end within a slave facet.
+DEGREES = {1: DEGREE, 2: 8}
+#: Distance both surfaces may move before partners are looked for anew, as a fraction of the mean slave facet's size.
+MARGIN = 0.25
+#: Gap that is taken for none, as a fraction of that size.
+TOUCH = 1e-12
+#: Multiple of the margin beyond which, or if not finite, a displacement is no state to look for partners in.
+WILD = 1e9
+
+
+class PairKinematics:
+    """The points of a slave surface and their partners on a master surface. Every method is collective.
+
+    Sliding pairs: a point's partner is where the ray along ν meets the current master surface, and the opening is the
+    distance along the ray.  The slide grows by −a_α·(x_m − x_s) at the *start* of the step, between the point and the
+    material point that it meets now: it needs no facet-wise memory, and a rigid rotation adds nothing to it.
+
+    Fixed pairs: partners are those of the reference configuration, and the jump is x_m − x_s in the frame, less what it
+    is in the reference configuration.
+
+    Args:
+        slave: The slave surface.
+        master: The master surface.
+        fixed: Whether pairs are fixed.
+        search: Largest distance of a partner [length].
+        size: Mean size of the slave facets [length].
+
+    Attributes:
+        search: Largest distance of a partner; it may change between steps [length].
+        tables: Shape functions and derivatives at the points of a slave facet.
+        version: Grows when other facets have come near each other.
+        near: Slave and master facets that are near each other.
+    """
+
+    def __init__(self, slave: OuterSurface, master: Master, *, fixed: bool, search: float, size: float) -> None:
+        self.slave, self.master, self.fixed, self.search = slave, master, fixed, search
+        shape = slave.shape.element
+        places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
+        self.tables = slave.shape.values(places)
+        self._size, self._margin = size, MARGIN * size
+        self.version = 0
+        nodes = slave.reference, master.reference
+        points = self._points(nodes[0])
+        self._look_around(points, nodes)
+        self._old, self._old_nodes, self._old_hits = points, nodes, self._hits(points, nodes)
+        self._slid: Array = np.zeros((len(points.x), points.x.shape[-1] - 1))
+        self._offset = np.zeros_like(points.x)
+        if fixed:
+            self._offset = self.pairs(nodes).jump
+
+    def nodes(self, u: Array, *, start: bool = False) -> tuple[Array, Array]:
+        """Current nodes of slave and master facets, from a displacement of the local dofs.
+
+        Args:
+            u: The displacement.
+            start: Whether it is that at the start of the step.
+        """
+        return self.slave.reference + self.slave.gather(u), self.master.nodes(u, start=start)
+
+    def interpolate(self, nodes: Array) -> Array:
+        """Values at the points of a field on the nodes of the slave facets."""
+        return np.einsum("qa,fai->fqi", self.tables[0], nodes).reshape(-1, nodes.shape[-1])
+
+    def at_stencil(self, field: Array, pairs: Pairs, rows: Indices) -> Array:
+        """Values of a field over the local dofs at the nodes on which some pairs act, slave facet first."""
+        slave = self.slave.gather(field)[pairs.hits.points[rows] // len(self.tables[0])]
+        return np.concatenate([slave, self.master.gather(field)[pairs.hits.facets[rows]]], axis=1)
+
+    def near_nodes(self) -> Indices:
+        """Global nodes on which pairs of near facets act, those of the slave facet first; slave facets of this rank."""
+        slave, master = (facets[self.slave.owned[self.near[0]]] for facets in self.near)
+        return np.hstack([self.slave.global_nodes[slave], self.master.global_nodes[master]])
+
+    def begin(self, nodes: tuple[Array, Array]) -> None:
+        """Take a configuration for the start of a step."""
+        self._old, self._old_nodes = self._points(nodes[0]), nodes
+        if not self.fixed:
+            self._old_hits = self._hits(self._old, nodes)
+
+    def commit(self, pairs: Pairs) -> None:
+        """Keep the slide at the end of a step."""
+        self._slid = pairs.jump[:, 1:]
+
+    @np.errstate(divide="ignore", invalid="ignore", over="ignore")
+    def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
+        """Points and partners for nodes of slave and master facets."""
+        points = self._points(nodes[0])
+        hits = self._old_hits if self.fixed else self._hits(points, nodes)
+        values, derivatives = self.master.shape.values(hits.xi)
+        y = nodes[1][hits.facets]
+        distance = np.einsum("nb,nbi->ni", values, y) - points.x[hits.points]
+        tangents = np.einsum("nkb,nbi->nki", derivatives, y)
+        if self.fixed:
+            jump, rate = self._fixed_jump(points, hits, distance), None
+        else:
+            jump, rate = self._sliding_jump(hits, values, derivatives)
+            self._slide_of_lost(points, hits, nodes[1], jump)
+        return Pairs(points, hits, values, derivatives, jump, rate, distance, tangents)
+
+    def _fixed_jump(self, points: Points, hits: Hits, distance: Array) -> Array:
+        jump = np.zeros_like(points.x)
+        jump[:, 0] = self.search
+        jump[hits.points] = np.einsum("nai,ni->na", points.frames[hits.points], distance) - self._offset[hits.points]
+        return jump
+
+    def _sliding_jump(self, hits: Hits, values: Array, derivatives: Array) -> tuple[Array, Array]:
+        """The jump, and its rate with the place on the master facet."""
+        frames, y = self._old.frames[hits.points, 1:], self._old_nodes[1][hits.facets]
+        before = np.einsum("nb,nbi->ni", values, y) - self._old.x[hits.points]
+        jump = np.column_stack([np.full(len(self._slid), self.search), self._slid])
+        # surfaces that just touch count as pressed: rounding would decide which points feel the other one
+        touch = TOUCH * self._size
+        jump[hits.points, 0] = np.where(np.abs(hits.gap) <= touch, -touch, hits.gap)
+        jump[hits.points, 1:] -= np.einsum("nai,ni->na", frames, before)
+        rate = np.zeros((len(before), jump.shape[1], jump.shape[1] - 1))
+        rate[:, 1:] = -np.einsum("nai,nkb,nbi->nak", frames, derivatives, y)
+        return jump, rate
+
+    def _slide_of_lost(self, points: Points, hits: Hits, master: Array, jump: Array) -> None:
+        """Slide of points that have lost their partner in this step, against the one they had: friction did work."""
+        lost = ~np.isin(self._old_hits.points, hits.points)
+        rows, facets = self._old_hits.points[lost], self._old_hits.facets[lost]
+        values = self.master.shape.values(self._old_hits.xi[lost])[0]
+        for sign, at, y in ((1, points, master), (-1, self._old, self._old_nodes[1])):
+            distance = np.einsum("nb,nbi->ni", values, y[facets]) - at.x[rows]
+            jump[rows, 1:] += sign * np.einsum("nai,ni->na", at.frames[rows, 1:], distance)
+
+    def _points(self, nodes: Array) -> Points:
+        return Points.on(nodes, self.slave.sides, self.tables)
+
+    def _hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
+        if self._moved(nodes):
+            self._look_around(points, nodes)
+        count = len(self.tables[0])
+        slaves, masters = self.near
+        of_facet = slaves[:, None] * count + np.arange(count)
+        pairs = of_facet.ravel(), np.repeat(masters, count)
+        return project(points.x, points.frames, pairs, nodes[1], self.master.sides, self.master.shape, self.search)
+
+    def _moved(self, nodes: tuple[Array, Array]) -> bool:
+        """Whether rays may have come nearer to other facets than the margin since these were last searched."""
+        slave, master = (np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, self._seen, strict=True))
+        farther = max(self.search - self._seen_search, 0.0)
+        total = self.slave.maximum(float(np.nan_to_num(slave + master + farther, nan=np.inf)))
+        return self._margin < total < WILD * self._margin
+
+    def _look_around(self, points: Points, nodes: tuple[Array, Array]) -> None:
+        """Find the facets that are near each other."""
+        count, ray = len(self.tables[0]), self.search * points.frames[:, 0]
+        shape = len(nodes[0]), count, points.x.shape[-1]
+        rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
+        self.near = near_facets(rays, nodes[1], self._margin)
+        self._seen, self._seen_search = nodes, self.search
+        self.version += 1

@@ -1,0 +1,110 @@
+"""The interface law at points whose jump is found by other means than a form (docs/theory.md §3, 3.5)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import ufl
+
+from cutsim.base.parameters import with_constants
+from cutsim.fields.points import FacetPoints, Values
+from cutsim.fields.state import State
+from cutsim.interface.cohesive import CohesiveLaw
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.history import InterfaceHistory
+from cutsim.interface.law import respond
+from cutsim.interface.slip import SlipHistory, completed
+from cutsim.pairs.pairing import Array
+
+
+@dataclass(frozen=True)
+class PairLaws:
+    """The laws of a pair of surfaces, which are those of a crack.
+
+    Args:
+        cohesive: Cohesive law, None for a broken interface.
+        contact: Contact law.
+        friction: Friction law, None for none; it acts on the broken fraction.
+        penetration: Largest mean penetration of a facet after augmentation [length]; None for no augmentation.
+        stick: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
+    """
+
+    cohesive: CohesiveLaw | None
+    contact: PenaltyContact
+    friction: FrictionLaw | None
+    penetration: float | None
+    stick: float | None
+
+
+class PairLaw:
+    """Tractions and their derivatives for a jump that is a function of the points. Every method is collective.
+
+    Args:
+        state: Displacement and time.
+        points: Integration points.
+        laws: The laws.
+        history: What the points remember of opening and damage.
+
+    Attributes:
+        slip: What the points remember of friction, or None.
+    """
+
+    def __init__(self, state: State, points: FacetPoints, laws: PairLaws, history: InterfaceHistory) -> None:
+        self._points, self._laws, self._history = points, laws, history
+        self._dim = state.mesh.geometry.dim
+        self._jump = points.function(self._dim)
+        jump = ufl.variable(points.at(self._jump))
+        slide = ufl.as_vector([jump[i] for i in range(1, self._dim)])
+        law = None if laws.cohesive is None else with_constants(state.mesh, laws.cohesive)
+        contact = with_constants(state.mesh, laws.contact)
+        r = respond(law, contact, jump[0], slide, points.at(history.kappa), points.at(history.multiplier))
+        shear = [r.shear[i] for i in range(self._dim - 1)]
+        columns = {
+            "demand": r.demand,
+            "cohesive": ufl.as_vector([r.tension, *shear]),
+            "damage": r.damage[0],
+            "sliding": r.sliding,
+            "pressure": r.pressure,
+            "held": contact.energy(-jump[0]),
+        }
+        self.slip: SlipHistory | None = None
+        if laws.friction is not None:
+            friction = completed(laws.friction, laws.contact.stiffness)
+            share, stick = r.damage[1], laws.stick
+            self.slip = SlipHistory(state, points, friction, slide, r.pressure, share=share, tolerance=stick)
+            shear = [s + share * t for s, t in zip(shear, self.slip.traction, strict=True)]
+        traction = ufl.as_vector([r.tension - r.pressure, *shear])
+        stiffness = ufl.diff(traction, jump)
+        flat = [stiffness[i, j] for i in range(self._dim) for j in range(self._dim)]
+        self._values = points.evaluator(columns)
+        self._traction = points.evaluator({"traction": traction})
+        self._linear = points.evaluator({"traction": traction, "stiffness": ufl.as_vector(flat)})
+
+    def set_jump(self, jump: Array) -> None:
+        """Opening and slide of all points, shape (points, dimension) [length]."""
+        self._points.set(self._jump, jump.reshape(*self._points.weights.shape, self._dim))
+
+    def values(self) -> dict[str, Values]:
+        """Values of the law for the present jump: what `InterfaceHistory` wants, "cohesive" as a vector, and "held"."""
+        return self._values()
+
+    def traction(self) -> Array:
+        """Tractions on the slave in the components of the jump, shape (points, dimension) [stress]."""
+        return self._traction()["traction"].reshape(-1, self._dim)
+
+    def linear(self) -> tuple[Array, Array]:
+        """Tractions, and their derivatives by the jump, shape (points, dimension, dimension) [stress/length]."""
+        values = self._linear()
+        return values["traction"].reshape(-1, self._dim), values["stiffness"].reshape(-1, self._dim, self._dim)
+
+    def augment(self) -> bool:
+        """Move multiplier and anchor; True if one was off by more than is allowed.
+
+        The multiplier is one value a facet: at every point it would hold a facet in more places than it has nodes.
+        """
+        pressed = False
+        if self._laws.penetration is not None:
+            pressure = self._values()["pressure"]
+            mean = np.broadcast_to(self._points.facet_mean(pressure)[:, None], pressure.shape)
+            pressed = self._history.augment(mean, self._laws.contact.stiffness * self._laws.penetration)
+        return (self.slip is not None and self.slip.augment()) or pressed

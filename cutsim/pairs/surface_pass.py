@@ -1,0 +1,204 @@
+"""One surface against another: jump, law and forces of a step (docs/theory.md §3.5)."""
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.assembly import add_blocks
+from cutsim.base.checks import require
+from cutsim.fields.points import FacetPoints, Values
+from cutsim.fields.state import State
+from cutsim.interface.history import GAUSS, TRAPEZOID, InterfaceHistory
+from cutsim.pairs import nodal_forces
+from cutsim.pairs.kinematics import DEGREES, PairKinematics
+from cutsim.pairs.law import PairLaw, PairLaws
+from cutsim.pairs.nodal_forces import Tractions
+from cutsim.pairs.pairing import Array
+from cutsim.pairs.points import Pairs
+
+# points whose tangents are held in memory at a time
+_CHUNK = 10_000
+
+
+def slave_points(state: State, facets: NDArray[np.int32]) -> FacetPoints:
+    """The integration points of a slave surface, given by its local exterior facets, ghosts included. Collective.
+
+    Raises:
+        ValueError: The displacement is not of degree 1 or 2.
+    """
+    degree = state.V.element.basix_element.degree
+    require("degree", degree, degree in DEGREES, "1 or 2: fields on the surfaces of a pair")
+    measure = state.measures.exterior(facets)
+    return FacetPoints(state.mesh, facets, measure, interior=False, degree=DEGREES[degree])
+
+
+class SurfacePass:
+    """The points of a slave surface against a master surface. Every method is collective.
+
+    The traction T acts on the slave, −T on the master.  Its components follow from the jump by the laws of a crack: the
+    jump is a function of the points, which is found beforehand.
+
+    Args:
+        state: Displacement and time.
+        points: Integration points on the slave facets.
+        kinematics: Finds the jump.
+        laws: Laws.
+        weight: Factor of the virtual work.
+
+    Attributes:
+        points: Integration points.
+        kinematics: Finds their partners.
+        weight: Factor of the virtual work.
+        weights: Weights of the points, flattened, times the factor; zero where another rank adds them.
+        history: What they remember of opening and damage.
+        slip: What they remember of friction, or None.
+        force: Force on the slave surface in the trial state [force].
+    """
+
+    def __init__(
+        self, state: State, points: FacetPoints, kinematics: PairKinematics, laws: PairLaws, *, weight: float
+    ) -> None:
+        self._state, self.points, self.kinematics, self.weight = state, points, kinematics, weight
+        self._dim = state.mesh.geometry.dim
+        own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
+        self.weights = weight * own.ravel()
+        self.history = InterfaceHistory(points, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
+        self._law = PairLaw(state, points, laws, self.history)
+        self.slip = self._law.slip
+        self._seen: Array | None = None
+        self.force = self._force_old = np.zeros(self._dim)
+
+    def _tractions(self, *, linearised: bool) -> Tractions:
+        """Tractions for the jump that was found last."""
+        if linearised:
+            return Tractions(*self._law.linear(), self.weights)
+        values = self._law.traction()
+        return Tractions(values, np.zeros((*values.shape, self._dim)), self.weights)
+
+    # -- configurations -------------------------------------------------------------------------------------------
+
+    def partners(self) -> Pairs:
+        """Pairs at the present displacement; the law knows their jump then."""
+        u = self._state.u.x.array
+        same = self._seen is not None and np.array_equal(u, self._seen)
+        if not self._state.mesh.comm.allreduce(same, op=MPI.LAND):
+            self._pairs = self.kinematics.pairs(self.kinematics.nodes(u))
+            self._seen = u.copy()
+            self._law.set_jump(self._pairs.jump)
+        return self._pairs
+
+    def _shaped(self, values: Array) -> Values:
+        return values.reshape(self.points.weights.shape)
+
+    def begin(self) -> None:
+        """Start a step from the committed displacement."""
+        self.kinematics.begin(self._start())
+        self._seen = None
+
+    def evaluate(self) -> None:
+        """Trial history, and the force on the slave, of the converged trial displacement."""
+        ends = self._start(), self.kinematics.nodes(self._state.u.x.array)
+        self.history.evaluate(lambda s: self._along(ends, s))
+        if self.slip is not None:
+            self.slip.evaluate()
+        self.force = self._state.mesh.comm.allreduce(self.point_forces().sum(axis=0))
+
+    def point_forces(self) -> Array:
+        """Present forces on the slave at the points, shape (points, dimension); zero where another rank adds them."""
+        pairs, tractions = self.partners(), self._tractions(linearised=False)
+        return np.asarray(np.einsum("n,na,nai->ni", self.weights, tractions.values, pairs.slave.frames))
+
+    def _start(self) -> tuple[Array, Array]:
+        return self.kinematics.nodes(self._state.u_old.x.array, start=True)
+
+    def _along(self, ends: tuple[tuple[Array, Array], ...], s: float) -> dict[str, Values]:
+        """Values on the way of the step, see `cutsim.interface.history.Along`."""
+        (slave, master), (slave_end, master_end) = ends
+        pairs = self.kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
+        self._law.set_jump(pairs.jump)
+        values = self._law.values()
+        change = pairs.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
+        power = np.einsum("nai,ni->na", pairs.slave.frames, change)
+        cohesive = values.pop("cohesive").reshape(-1, self._dim)
+        return values | {
+            "cohesive_power": self._shaped(np.einsum("na,na->n", cohesive, power)),
+            "contact_power": -values["pressure"] * self._shaped(power[:, 0]),
+            "stored": 0.5 * self._shaped(np.einsum("na,na->n", cohesive, pairs.jump)),
+            "opening": self._shaped(pairs.jump[:, 0]),
+        }
+
+    def augment(self) -> bool:
+        """Improve multiplier and anchor; True if the step has to be solved again."""
+        self.partners()
+        return self._law.augment()
+
+    def energies(self) -> dict[str, float]:
+        """Energies of the pass, by entry of the audit.
+
+        Where normals of facets differ, pressure does work on a slide at constant penetration: work that the penalty
+        does not hold is numerical.
+        """
+        total = {**self.history.energies(), "friction": 0.0}
+        held = self.points.integral(self.history.trial["held"])
+        total |= {"contact": held, "numerical": total["contact"] - held}
+        for entry, value in (self.slip.energies() if self.slip is not None else {}).items():
+            total[entry] += value
+        return {entry: self.weight * value for entry, value in total.items()}
+
+    def rollback(self) -> None:
+        """Forget the trial step."""
+        self.history.rollback()
+        if self.slip is not None:
+            self.slip.rollback()
+        self.force, self._seen = self._force_old, None
+
+    def commit(self) -> None:
+        """Adopt history, slide and force of the step."""
+        self.kinematics.commit(self.partners())
+        self.history.commit()
+        if self.slip is not None:
+            self.slip.commit()
+        self._force_old = self.force
+
+    # -- forces ---------------------------------------------------------------------------------------------------
+
+    @property
+    def pattern(self) -> int:
+        """Number of the sparsity pattern."""
+        return self.kinematics.version
+
+    def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
+        """Add nodal forces, as `cutsim.base.terms.Term.add_forces`."""
+        kinematics, pairs = self.kinematics, self.partners()
+        tractions = self._tractions(linearised=along is not None)
+        rows = nodal_forces.active(kinematics, pairs, tractions)
+        forces = nodal_forces.forces(kinematics, pairs, tractions, rows)
+        if along is not None:
+            change = kinematics.at_stencil(along, pairs, rows)
+            forces += np.einsum("nricj,ncj->nri", nodal_forces.tangents(kinematics, pairs, tractions, rows), change)
+        dofs = self.dofs(nodal_forces.nodes(kinematics, pairs, rows))
+        # nodes of a rigid master have none; matrices pass over them unasked
+        b.setOption(PETSc.Vec.Option.IGNORE_NEGATIVE_INDICES, True)
+        b.setValues(dofs.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add the tangent, as `cutsim.base.terms.Term.add_tangent`."""
+        kinematics, pairs, tractions = self.kinematics, self.partners(), self._tractions(linearised=True)
+        rows = nodal_forces.active(kinematics, pairs, tractions)
+        for some in np.array_split(rows, 1 + len(rows) // _CHUNK):
+            starts, nodes = nodal_forces.stencils(kinematics, pairs, some)
+            if len(starts):
+                blocks = np.add.reduceat(nodal_forces.tangents(kinematics, pairs, tractions, some), starts)
+                dofs = self.dofs(nodes)
+                add_blocks(A, dofs, blocks.reshape(*dofs.shape, dofs.shape[1]))
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros, as `cutsim.base.terms.Term.add_pattern`."""
+        dofs = self.dofs(self.kinematics.near_nodes())
+        for some in np.array_split(dofs, 1 + len(dofs) // _CHUNK):
+            add_blocks(A, some, np.zeros((*some.shape, some.shape[1])))
+
+    def dofs(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Global dofs of global nodes, shape (…, nodes) → (…, dofs); negative for −1."""
+        return (nodes[..., None] * self._dim + np.arange(self._dim)).reshape(len(nodes), self._dim * nodes.shape[1])

@@ -1,0 +1,288 @@
+"""What a run leaves behind in numbers: history rows, a summary, and fields for ParaView."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from numbers import Integral
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TextIO
+
+import numpy as np
+from dolfinx import fem, io
+from mpi4py import MPI
+from numpy.typing import NDArray
+from ufl.core.expr import Expr
+
+from cutsim.base import compat
+from cutsim.base.checks import require
+from cutsim.base.units import Units
+
+_TAKEN = ("displacement", "fields")
+
+
+class _Closing:
+    """A context manager that closes itself at the end."""
+
+    def close(self) -> None:
+        """Close; a second call does nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class HistoryWriter(_Closing):
+    """A CSV table that grows by one row per accepted step.
+
+    Every row is flushed as it is written, so the file is complete and readable at any moment, also after a
+    crash. Use it as a context manager; its methods are collective.
+
+    Args:
+        path: The file; folders are made, an older file is replaced.
+        columns: Name of each column -> kind of quantity (see `cutsim.base.units.KINDS`), in the order of the file.
+        units: Units for the header.
+        comm: Communicator of the run; its first rank writes.
+
+    Raises:
+        ValueError: If there are no columns, a kind is unknown, or a name has a comma, bracket, quote or line
+            break.
+        OSError: If the file cannot be opened, on all ranks.
+    """
+
+    def __init__(self, path: Path | str, columns: Mapping[str, str], units: Units, comm: MPI.Comm) -> None:
+        require("columns", dict(columns), len(columns) > 0, "at least one column")
+        for name in columns:
+            plain = bool(name.strip()) and not set(name) & set(',[]"\r\n')
+            require("columns", name, plain, "a name without comma, bracket, quote or line break")
+        self._comm, self._names = comm, tuple(columns)
+        self._file: TextIO | None = None
+        header = [units.label(name, kind) for name, kind in columns.items()]
+        _on_root(comm, lambda: self._open(Path(path), header))
+
+    def append(self, row: Mapping[str, float]) -> None:
+        """Write one row. Collective.
+
+        Args:
+            row: Column name -> number; the same names as `columns`, in any order, equal on all ranks.
+
+        Raises:
+            ValueError: If a column is missing, unknown, or not a number.
+            OSError: If the row cannot be written, on all ranks.
+        """
+        missing, extra = set(self._names) - set(row), set(row) - set(self._names)
+        if missing or extra:
+            raise ValueError(f"row lacks {sorted(missing)} and has {sorted(extra)} besides {self._names}")
+        cells = [_cell(name, row[name]) for name in self._names]
+        _on_root(self._comm, lambda: self._write(cells))
+
+    def close(self) -> None:
+        """Close the file; a second call does nothing."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def _open(self, path: Path, header: list[str]) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = path.open("w", encoding="utf-8", newline="")
+        self._write(header)
+
+    def _write(self, cells: list[str]) -> None:
+        if self._file is None:
+            raise ValueError("the history is closed, no row can be written")
+        csv.writer(self._file, lineterminator="\n").writerow(cells)
+        self._file.flush()
+
+
+def read_history(path: Path | str) -> dict[str, NDArray[np.float64]]:
+    """Read a history written by `HistoryWriter`, also one that is still growing.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Column name without its unit -> values, one per complete row.
+    """
+    text = Path(path).read_text(encoding="utf-8")
+    complete = text[: text.rfind("\n") + 1]  # a run that was killed may leave half a row
+    header, *rows = csv.reader(complete.splitlines())
+    names = [label.split(" [")[0] for label in header]
+    values = np.array(rows, dtype=np.float64).reshape(-1, len(names))
+    return dict(zip(names, values.T, strict=True))
+
+
+def write_summary(path: Path | str, values: Mapping[str, Any], comm: MPI.Comm) -> None:
+    """Write the headline numbers of a run as JSON. Collective.
+
+    The file is replaced in one go: a reader sees the old or the new one, never half of it. Numbers keep full
+    precision, numpy types become plain ones, and a number that is not finite becomes null.
+
+    Args:
+        path: The file; folders are made.
+        values: What to write; mappings and sequences may be nested.
+        comm: Communicator of the run; its first rank writes.
+
+    Raises:
+        OSError: If the file cannot be written, on all ranks.
+        TypeError: If a value has no JSON form, on all ranks.
+    """
+
+    def write() -> None:
+        target = Path(path)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        draft = target.with_name(target.name + ".part")
+        text = json.dumps(_plain(values), indent=2, ensure_ascii=False, allow_nan=False)
+        draft.write_text(text + "\n", encoding="utf-8")
+        os.replace(draft, target)
+
+    _on_root(comm, write)
+
+
+class FieldWriter(_Closing):
+    """Fields in VTX files (ADIOS2), which ParaView opens with its ADIOS2VTXReader. Collective.
+
+    - ``displacement.bp`` holds u as it is solved for. Its points are the nodes of the space, so a crack opens
+      when the grid is warped by u.
+    - ``fields.bp`` holds the derived fields on a discontinuous linear space, with u beside them: the deformed
+      body can be coloured by stress. For u of degree k expressions are sampled in degree k - 1, for a linear u in
+      the middle of each cell, where stresses are most accurate and free of locking noise; a function, such as
+      a temperature, is shown as it is.
+    - Each entry of ``surfaces`` is a file of its own: VTX takes one mesh and one element a file.
+
+    Use it as a context manager. Files are readable up to the last step written, also after a crash.
+
+    Args:
+        directory: Where the files go; made if need be.
+        u: The displacement, Lagrange of degree 1 or 2, on an ordinary or a cracked space.
+        derived: Name -> UFL expression of a scalar, vector or tensor on the mesh of u; compiled once, here.
+        surfaces: File name without suffix -> functions on one submesh of crack facets, of one element (DG 0
+            or 1), known in the file by their own names.
+
+    Raises:
+        ValueError: If a name is taken.
+    """
+
+    def __init__(
+        self,
+        directory: Path | str,
+        u: fem.Function,
+        derived: Mapping[str, Expr] | None = None,
+        surfaces: Mapping[str, Sequence[fem.Function]] | None = None,
+    ) -> None:
+        derived, surfaces = derived or {}, surfaces or {}
+        for name in surfaces:
+            require("surfaces", name, name not in _TAKEN, f"a name other than {', '.join(_TAKEN)}")
+        for name in derived:
+            require("derived", name, name != u.name, "a name other than that of the displacement")
+        self._derived = [_Derived.of(u, name, expression) for name, expression in derived.items()]
+        if derived:
+            self._derived.append(_Derived.of(u, u.name, u))
+        groups = {"displacement": [u], "fields": [d.shown for d in self._derived], **surfaces}
+        comm = u.function_space.mesh.comm
+        _on_root(comm, lambda: Path(directory).mkdir(parents=True, exist_ok=True))
+        self._stack = ExitStack()
+        self._writers = [
+            self._stack.enter_context(io.VTXWriter(comm, f"{directory}/{stem}.bp", functions, engine="BP4"))
+            for stem, functions in groups.items()
+            if functions
+        ]
+
+    def write(self, time: float) -> None:
+        """Evaluate the derived fields and write everything as the state at one time. Collective.
+
+        Args:
+            time: Time or load parameter, greater than that of the last call.
+        """
+        for field in self._derived:
+            field.update()
+        for writer in self._writers:
+            writer.write(time)
+
+    def close(self) -> None:
+        """Close the files. Collective; a second call does nothing."""
+        self._stack.close()
+
+
+def interpolate(function: fem.Function, expression: Expr) -> None:
+    """Interpolate a UFL expression, compiled with the project's options. Collective.
+
+    Args:
+        function: What is set, ghosts included.
+        expression: UFL expression of the function's shape on its mesh.
+    """
+    function.interpolate(_compiled(function, expression))
+    function.x.scatter_forward()
+
+
+def _compiled(function: fem.Function, expression: Expr) -> fem.Expression:
+    """The expression at the interpolation points of a function's space."""
+    V = function.function_space
+    return compat.expression(expression, V.element.interpolation_points(), V.mesh)
+
+
+@dataclass(frozen=True)
+class _Derived:
+    """An expression, sampled where it is accurate and shown on the discontinuous linear space."""
+
+    source: fem.Expression | fem.Function
+    sample: fem.Function
+    shown: fem.Function
+
+    @classmethod
+    def of(cls, u: fem.Function, name: str, expression: Expr) -> Self:
+        mesh, shape = u.function_space.mesh, expression.ufl_shape
+        shown = fem.Function(fem.functionspace(mesh, ("DG", 1, shape)), name=name)
+        if isinstance(expression, fem.Function):
+            return cls(expression, shown, shown)
+        degree = u.function_space.ufl_element().degree - 1
+        sample = fem.Function(fem.functionspace(mesh, ("DG", degree, shape)))
+        return cls(_compiled(sample, expression), sample, shown)
+
+    def update(self) -> None:
+        self.sample.interpolate(self.source)
+        if self.shown is not self.sample:
+            self.shown.interpolate(self.sample)
+
+
+def _on_root(comm: MPI.Comm, action: Callable[[], None]) -> None:
+    """Run an action on the first rank; what it raises is raised on every rank."""
+    error = None
+    if comm.rank == 0:
+        try:
+            action()
+        except Exception as raised:
+            error = raised
+    error = comm.bcast(error, root=0)
+    if error is not None:
+        raise error
+
+
+def _cell(name: str, value: float) -> str:
+    """A number as CSV text that reads back to the same bits."""
+    try:
+        return str(int(value)) if isinstance(value, Integral) else repr(float(value))
+    except (TypeError, ValueError):
+        raise ValueError(f"row has {name} = {value!r}, a number is needed") from None
+
+
+def _plain(value: Any) -> Any:
+    """A value in the types JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(entry) for key, entry in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,144 @@
+"""What a run leaves in a folder while it goes on: history, fields, progress."""
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from dolfinx import fem
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.interface.crack import Crack
+from cutsim.base.kinematics import Expr
+from cutsim.results.output import FieldWriter, HistoryWriter
+from cutsim.results.progress import Progress
+from cutsim.analysis.stepping import Problem, StepError, StepReport
+from cutsim.base.units import Units
+
+Columns = dict[str, tuple[float, str]]
+
+#: Fields of a crack, averaged over each facet.
+CRACK_FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
+
+
+class Recording:
+    """Recorder of a run: pass it to `cutsim.analysis.stepping.run`. Use it as a context manager; collective.
+
+    Writes ``history.csv`` row by row and, every few steps and after the last, also if the run fails or is stopped,
+    ``displacement.bp``, ``fields.bp`` and a file for each crack, and shows progress.
+
+    Args:
+        folder: Where the files go.
+        problem: The problem.
+        until: Time at which the run ends.
+        title: What is running, in a word or two, for the progress bar.
+        units: Units of the history's header.
+        show: Label → column, for the progress bar.
+        extra: Further columns, computed from those of the step on all ranks.
+        derived: Name → UFL expression of fields such as stress.
+        every: Fields are written every so many steps, ≥ 1; 0 for no fields.
+
+    Attributes:
+        history: Column → list of values so far, the same on all ranks.
+    """
+
+    def __init__(
+        self,
+        folder: Path | str,
+        problem: Problem,
+        until: float,
+        *,
+        title: str = "run",
+        units: Units | None = None,
+        show: Mapping[str, str] | None = None,
+        extra: Callable[[Columns], Columns] = lambda _: {},
+        derived: Mapping[str, Expr] | None = None,
+        every: int = 5,
+    ) -> None:
+        require("every", every, every >= 0, ">= 0")
+        self.folder, self.problem, self._units = Path(folder), problem, units or Units()
+        self._show, self._extra, self._every = dict(show or {}), extra, every
+        self.history: dict[str, list[float]] = {}
+        self._stack = ExitStack()
+        self._table: HistoryWriter | None = None
+        self._cracks = [_CrackFields(t) for t in problem.terms if isinstance(t, Crack) and t.law is not None]
+        comm, start = problem.state.mesh.comm, problem.state.time_old
+        self._progress = self._stack.enter_context(Progress(until, comm, title, start=start))
+        self._unwritten: float | None = None
+        self._fields: FieldWriter | None = None
+        if every:
+            surfaces = {c.crack.name: c.functions for c in self._cracks}
+            derived = {**problem.fields, **(derived or {})}
+            self._fields = self._stack.enter_context(FieldWriter(self.folder, problem.state.u, derived, surfaces))
+
+    def __call__(self, report: StepReport) -> None:
+        """Record an accepted step. Collective."""
+        columns: Columns = {"step": (float(report.number), "one"), "time": (report.time, "time")}
+        columns |= report.columns | self._extra(report.columns)
+        columns["newton"] = (float(report.outcome.iterations), "one")
+        columns["krylov"] = (float(report.outcome.linear_iterations), "one")
+        columns["cuts"] = (float(report.cuts), "one")
+        comm = self.problem.state.mesh.comm
+        if self._table is None:
+            kinds = {name: kind for name, (_, kind) in columns.items()}
+            table = HistoryWriter(self.folder / "history.csv", kinds, self._units, comm)
+            self._table = self._stack.enter_context(table)
+        row = {name: value for name, (value, _) in columns.items()}
+        for name, value in row.items():
+            self.history.setdefault(name, []).append(value)
+        self._table.append(row)
+        shown = {label: row[column] for label, column in self._show.items()}
+        self._progress.update(report.time, step=report.number, **shown, iterations=report.outcome.iterations)
+        self._unwritten = report.time
+        if self._every and report.number % self._every == 0:
+            self.write_fields(report.time)
+
+    def write_fields(self, time: float) -> None:
+        """Write the fields of the present state. Collective."""
+        self._unwritten = None
+        for crack in self._cracks:
+            crack.update()
+        if self._fields is not None:
+            self._fields.write(time)
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """A column of the history so far.
+
+        Raises:
+            ValueError: There is no such column.
+        """
+        require("column", name, name in self.history, f"one of {', '.join(self.history)}")
+        return np.asarray(self.history[name])
+
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """All columns of the history so far."""
+        return {name: np.asarray(values) for name, values in self.history.items()}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        # only these ends are known to be met by all ranks
+        if self._unwritten is not None and (kind is None or issubclass(kind, StepError)):
+            self.write_fields(self._unwritten)
+        self._stack.close()
+
+
+class _CrackFields:
+    """Facet means of a crack as functions on its submesh."""
+
+    def __init__(self, crack: Crack) -> None:
+        self.crack = crack
+        space = fem.functionspace(crack.points.submesh, ("DG", 0))
+        self._dofs = space.dofmap.list[:, 0]
+        self.functions = [fem.Function(space, name=name) for name in CRACK_FIELDS]
+
+    def update(self) -> None:
+        """Copy the present facet means."""
+        for function in self.functions:
+            function.x.array[self._dofs] = self.crack.facet_mean(function.name)

@@ -1,0 +1,400 @@
+"""The nonlinear problem F(u; v) = 0: one Newton solver with a preconditioner that looks after itself."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import ufl
+from dolfinx import fem, la
+from dolfinx.common import Timer
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base import compat
+from cutsim.base.checks import require
+from cutsim.base.options import Options
+from cutsim.base.terms import Term
+from cutsim.solvers.preconditioners import LaggedPC, Preset, create_lagged, fallback_for, preset_for
+from cutsim.solvers.tangent import Tangent
+
+log = logging.getLogger(__name__)
+
+LINE_SEARCHES = ("l2", "bt", "basic")
+#: Rounding level of the residual, as a fraction of the nodal forces ||diag(K)|| (max |u| + h) that cancel in it. The
+#: cell size h stands for the deformation gradient, which is known within the rounding of 1 however small u is.
+ROUNDING = 1e-14
+#: A prescribed displacement holds when it is met within this fraction of max |u| + h.
+BC_ROUNDING = 1e-12
+#: Growth of the residual at which an iteration is given up.
+GROWTH = 1e6
+
+_Reason = PETSc.SNES.ConvergedReason
+# SNES stops for a new matrix, and goes on
+_PAUSE = _Reason.CONVERGED_ITS
+_NOT_FINITE = "residual or tangent not finite (element inverted, J <= 0)"
+_SENTENCES = {
+    _Reason.DIVERGED_FUNCTION_DOMAIN: _NOT_FINITE,
+    _Reason.DIVERGED_FNORM_NAN: _NOT_FINITE,
+    _Reason.DIVERGED_LINE_SEARCH: "line search failed",
+    _Reason.DIVERGED_LOCAL_MIN: "line search failed at a local minimum of the residual",
+    _Reason.DIVERGED_LINEAR_SOLVE: "linear solver did not converge",
+    _Reason.DIVERGED_DTOL: f"residual grew by more than {GROWTH:.0e}",
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a solve.
+
+    Attributes:
+        converged: Whether equilibrium was reached; if not, u is the last iterate.
+        reason: PETSc SNES reason, positive if converged.
+        message: The reason as a sentence.
+        iterations: Newton iterations.
+        linear_iterations: Krylov iterations, summed over the Newton iterations.
+        residuals: Norm of the out-of-balance forces over the force scale, one per iterate, the start included.
+    """
+
+    converged: bool
+    reason: int
+    message: str
+    iterations: int
+    linear_iterations: int
+    residuals: tuple[float, ...]
+
+
+class NonlinearProblem:
+    """Newton's method for F(u; v) = 0 with Dirichlet conditions. Every method is collective.
+
+    Prescribed values are never written into u before the solve: their increment is lifted through the tangent in
+    the first iteration. Converged means that the prescribed values hold and that the norm of the free rows of F is
+    at most `rtol` times the force scale. The force scale is the norm of the reactions, of the present iterate or
+    of the last converged solve, whichever is larger; without any Dirichlet condition it is the norm of F at the
+    start, and with inertia the larger of both. A state free of forces is accepted when F is down to rounding,
+    1e-14 ||diag(K)|| (max |u| + h).
+
+    Args:
+        F: Residual, linear in a test function of the space of u: internal minus external virtual work.
+        u: The unknown; start and result of a solve.
+        petsc_options_prefix: Prefix of all PETSc options of this problem; not empty, and its own.
+        bcs: Dirichlet conditions. Their values may change between solves, their dofs may not.
+        J: Tangent; derived from F by default.
+        petsc_options: PETSc options without prefix. With `pc_type` or `ksp_type` among them no preset is used and
+            PETSc does as told; otherwise they refine the preset of `cutsim.solvers.preconditioners.preset_for`, whose
+            preconditioners have the prefixes `direct_`, `bulk_`, `crack_` and `strip_`.
+        entity_maps: Entity maps of the forms.
+        jit_options: Override `cutsim.base.compat.JIT_OPTIONS`.
+        interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
+        symmetric: Whether the tangent is symmetric.
+        inertia: Whether inertia balances forces, too: there may be supports without any reaction.
+        terms: Terms with forces that are not in F: they assemble themselves.
+        form_compiler_options: Options of FFCx.
+        rtol: Tolerance relative to the force scale; PETSc option `snes_rtol`.
+
+    Attributes:
+        known: Owned nodal forces that are added to those of F, such as the share of the last step in a time
+            integration scheme; zero at first.
+        fixed: Which owned dofs have a Dirichlet condition.
+
+    Raises:
+        ValueError: The prefix is empty or `rtol` is not positive.
+    """
+
+    def __init__(
+        self,
+        F: ufl.Form,
+        u: fem.Function,
+        *,
+        petsc_options_prefix: str,
+        bcs: Sequence[fem.DirichletBC] = (),
+        J: ufl.Form | None = None,
+        petsc_options: Mapping[str, Any] | None = None,
+        entity_maps: Mapping[Any, Any] | None = None,
+        jit_options: Mapping[str, Any] | None = None,
+        interface_dofs: NDArray[np.int32] | None = None,
+        symmetric: bool = False,
+        inertia: bool = False,
+        terms: Sequence[Term] = (),
+        form_compiler_options: Mapping[str, Any] | None = None,
+        rtol: float = 1e-8,
+    ) -> None:
+        require("rtol", rtol, rtol > 0.0, "positive")
+        self._options = Options(petsc_options_prefix, petsc_options or {})
+        self.u, self.bcs = u, list(bcs)
+        self._symmetric, self._interface_dofs, self._by_start = symmetric, interface_dofs, inertia or not bcs
+        if J is None:
+            J = ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
+        self._L, self._a = (
+            compat.form(
+                form, entity_maps=entity_maps, jit_options=jit_options, form_compiler_options=form_compiler_options
+            )
+            for form in (F, J)
+        )
+        self._terms = tuple(terms)
+        self._create_vectors()
+        self._tangent = Tangent(self._a, u.function_space, symmetric, terms)
+        self._create_snes(rtol)
+
+    def _create_vectors(self) -> None:
+        V = self.u.function_space
+        layout = V.dofmap.index_map, V.dofmap.index_map_bs
+        self._comm: MPI.Comm = V.mesh.comm
+        self._n_dofs = layout[0].size_global * layout[1]
+        self._n = layout[0].size_local * layout[1]
+        self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
+        # SNES iterates on a vector of its own: were it that of u, line searches would spoil their own start.
+        self._x = la.create_petsc_vector(*layout)
+        self._f, self._added = self._x.duplicate(), self._x.duplicate()
+        self.known: NDArray[np.float64] = np.zeros(self._n)
+        self.fixed = np.zeros(self._n, dtype=bool)
+        for bc in self.bcs:
+            dofs = bc.dof_indices()[0]
+            self.fixed[dofs[dofs < self._n]] = True
+        self._previous_scale = 0.0
+        cells = np.arange(V.mesh.topology.index_map(V.mesh.topology.dim).size_local, dtype=np.int32)
+        h = np.max(V.mesh.h(V.mesh.topology.dim, cells), initial=0.0)
+        self._h = self._comm.allreduce(h, MPI.MAX)
+
+    def _create_snes(self, rtol: float) -> None:
+        self._snes = PETSc.SNES().create(self._comm)
+        self._snes.setOptionsPrefix(self._options.prefix)
+        self._snes.setFunction(self._evaluate_residual, self._f)
+        self._snes.setJacobian(self._evaluate_tangent, self._tangent.A)
+        self._snes.setConvergenceTest(self._test)
+        self._snes.setLineSearchPreCheck(self._check_step)
+        # stol = 0: a small step is no sign of equilibrium.
+        self._snes.setTolerances(rtol=rtol, stol=0.0, max_it=25)
+        self._options.default({"snes_linesearch_type": LINE_SEARCHES[0]})
+        self._lagged: LaggedPC | None = None
+        if "pc_type" not in self._options and "ksp_type" not in self._options:
+            has_interface, gdim = self._interface_dofs is not None, self.u.function_space.mesh.geometry.dim
+            self._install(preset_for(self._n_dofs, self._symmetric, self._comm.size, has_interface, gdim))
+        self._snes.setFromOptions()
+        self._rtol, _, _, self._max_it = self._snes.getTolerances()
+
+    def _install(self, preset: Preset) -> None:
+        """Use a preset; options of the user win over its own."""
+        self._preset = preset
+        self._options.default(preset.ksp)
+        self._options.default(preset.kept, preset.name + "_")
+        self._options.default(preset.strip, "strip_")
+        self._lagged = create_lagged(
+            preset, self._options.prefix, self.u.function_space, self._interface_dofs, self._symmetric
+        )
+        pc = self._snes.getKSP().getPC()
+        pc.setType(PETSc.PC.Type.PYTHON)
+        pc.setPythonContext(self._lagged)
+
+    @property
+    def snes(self) -> PETSc.SNES:
+        """The PETSc solver."""
+        return self._snes
+
+    @property
+    def preconditioner(self) -> LaggedPC | None:
+        """The preconditioner of the preset: `refresh` it when the sparsity pattern has changed; None if the user's."""
+        return self._lagged
+
+    def solve(self, line_search: str | None = None) -> Outcome:
+        """Solve from the present u.
+
+        Args:
+            line_search: "l2", "bt" or "basic"; by default the one of the last solve, at first "l2" or the option
+                `snes_linesearch_type`.
+
+        Returns:
+            The outcome. Failure does not raise and leaves u at the last iterate.
+
+        Raises:
+            ValueError: The line search is unknown.
+        """
+        if line_search is not None:
+            require("line_search", line_search, line_search in LINE_SEARCHES, f"one of {', '.join(LINE_SEARCHES)}")
+            self._options.set("snes_linesearch_type", line_search)
+            self._snes.setFromOptions()
+        with Timer("~cutsim: nonlinear solve"):
+            iterations, linear = self._iterate()
+        self._assign(self._x)
+        reason = self._snes.getConvergedReason()
+        if reason > 0:
+            self._previous_scale = self._force
+        return Outcome(
+            converged=reason > 0,
+            reason=reason,
+            message=self._message(reason),
+            iterations=iterations,
+            linear_iterations=linear,
+            residuals=tuple(float(r / (self._scale or 1.0)) for r in self._residuals),
+        )
+
+    def _iterate(self) -> tuple[int, int]:
+        """Run SNES, again after each failure of the linear solver that a better preconditioner may cure."""
+        self._x.array[:] = self.u.x.array[: self._n]
+        for bc in self.bcs:
+            bc.set(self._g.array, None, 1.0)
+        self._residuals: list[float] = []
+        self._size = 0.0
+        self._scale = self._previous_scale
+        iterations = linear = 0
+        while True:
+            if self._tangent.outdated:
+                self._renew_tangent()
+            self._snes.setTolerances(max_it=self._max_it - iterations)
+            self._snes.solve(None, self._x)
+            iterations += self._snes.getIterationNumber()
+            linear += self._snes.getLinearSolveIterations()
+            if self._snes.getConvergedReason() == _PAUSE:
+                continue
+            if self._snes.getConvergedReason() != _Reason.DIVERGED_LINEAR_SOLVE or not self._better_preconditioner():
+                return iterations, linear
+
+    def _renew_tangent(self) -> None:
+        """A matrix for another sparsity pattern; what was factorised before is of no use."""
+        if self._lagged is None:
+            self._snes.getKSP().reset()
+        else:
+            self._lagged.refresh(pattern=True)
+        self._tangent.renew()
+        self._snes.setJacobian(self._evaluate_tangent, self._tangent.A)
+
+    def _better_preconditioner(self) -> bool:
+        """After a failed linear solve: rebuild the preconditioner, or else factorise; False if neither is left."""
+        if self._lagged is None or not self._tangent.finite:
+            return False
+        was_fresh = self._lagged.fresh
+        self._lagged.refresh()
+        if not was_fresh:
+            return True
+        fallback = fallback_for(self._preset, self._n_dofs, self._symmetric)
+        if fallback is None:
+            return False
+        log.warning("Linear solver %r failed: %r from now on", self._preset.name, fallback.name)
+        self._install(fallback)
+        return True
+
+    def _message(self, reason: int) -> str:
+        if reason > 0:
+            return "converged"
+        if reason == _Reason.DIVERGED_MAX_IT:
+            return f"no convergence in {self._max_it} iterations"
+        if reason == _Reason.DIVERGED_LINEAR_SOLVE and not self._tangent.finite:
+            return _NOT_FINITE
+        return _SENTENCES.get(reason, f"PETSc SNES reason {reason}")
+
+    def residual(self) -> PETSc.Vec:
+        """Internal minus external forces at the present u, known ones and the constrained rows included.
+
+        Returns:
+            A new vector of the owned dofs; the caller owns it.
+        """
+        self._assemble_residual(lift=False)
+        b = self._x.duplicate()
+        b.array[:] = self._r.array[: self._n]
+        return b
+
+    def reactions(self) -> PETSc.Vec:
+        """Forces of the supports on the body at the present u: `residual` on constrained rows, zero elsewhere.
+
+        Returns:
+            A new vector of the owned dofs; the caller owns it.
+        """
+        b = self.residual()
+        b.array[~self.fixed] = 0.0
+        return b
+
+    def _assign(self, x: PETSc.Vec) -> None:
+        self.u.x.array[: self._n] = x.array_r
+        self.u.x.scatter_forward()
+
+    def _assemble_residual(self, *, lift: bool) -> None:
+        for term in self._terms:
+            term.prepare()
+        r = self._r.array
+        r[:] = 0.0
+        fem.assemble_vector(r, self._L)
+        if lift:
+            fem.apply_lifting(r, [self._a], [self.bcs], [self.u.x.array], -1.0)
+        self._r.scatter_reverse(la.InsertMode.add)
+        r[: self._n] += self.known
+        if self._terms:
+            self._add_terms(lift)
+
+    def _add_terms(self, lift: bool) -> None:
+        """Add the forces of terms that assemble themselves, and the lifting of prescribed increments."""
+        jump = self._lifted.array
+        jump[:] = 0.0
+        jump[: self._n][self.fixed] = (self._g.array - self.u.x.array)[: self._n][self.fixed]
+        self._lifted.scatter_forward()
+        lift = lift and self._comm.allreduce(bool(jump.any()), MPI.LOR)
+        self._added.set(0.0)
+        for term in self._terms:
+            term.add_forces(self._added, jump if lift else None)
+        self._added.assemble()
+        self._r.array[: self._n] += self._added.array_r
+
+    def _evaluate_residual(self, snes: PETSc.SNES, x: PETSc.Vec, b: PETSc.Vec) -> None:
+        """Called by SNES: residual with lifting; u - g in the constrained rows."""
+        self._assign(x)
+        self._assemble_residual(lift=True)
+        b.array[:] = self._r.array[: self._n]
+        # While prescribed values do not hold, these rows carry lifting too; but then u is no solution either.
+        self._reaction = b.array_r[self.fixed]
+        b.array[self.fixed] = self._jump(x)
+
+    def _jump(self, x: PETSc.Vec) -> NDArray[np.float64]:
+        return x.array_r[self.fixed] - self._g.array[: self._n][self.fixed]
+
+    def _evaluate_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
+        """Called by SNES."""
+        self._assign(x)
+        for term in self._terms:
+            term.prepare()
+        self._tangent.assemble(self.bcs)
+
+    def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:
+        """Called by SNES after the linear solve: make the step of the constrained dofs exact."""
+        y.array[self.fixed] = self._jump(x)
+        if self._lagged is not None:
+            self._lagged.observe(self._snes.getKSP().getIterationNumber())
+        return True
+
+    def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
+        """Called by SNES: reduce the local numbers, then judge."""
+        f, x = snes.getFunction()[0].array_r, snes.getSolution().array_r
+        squares = [f[~self.fixed], self._reaction, self._tangent.diagonal[~self.fixed]]
+        free, reaction, stiffness = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
+        jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self.fixed], x))
+        self._size = max(self._size, size)
+        length = self._size + self._h
+        reason = self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
+        return _PAUSE if reason == _Reason.ITERATING and self._tangent.outdated else reason
+
+    def _judge(self, iteration: int, free: float, reaction: float, floor: float, bcs_hold: bool) -> int:
+        """Decide from global numbers only, so that every rank decides alike."""
+        if iteration > 0 or not self._residuals:  # a start after a cured linear solve is no new iterate
+            self._residuals.append(free)
+        start = self._residuals[0]
+        self._force = max(reaction, start) if self._by_start else reaction
+        self._scale = max(self._previous_scale, self._force)
+        if not np.isfinite(free):
+            return _Reason.DIVERGED_FNORM_NAN
+        if bcs_hold and free <= max(self._rtol * self._scale, floor):
+            return _Reason.CONVERGED_FNORM_RELATIVE
+        if free > GROWTH * max(start, self._scale):
+            return _Reason.DIVERGED_DTOL
+        return _Reason.ITERATING
+
+    def destroy(self) -> None:
+        """Free the PETSc objects and remove the options of this problem."""
+        for thing in (self._snes, self._tangent, self._x, self._f, self._added):
+            thing.destroy()
+        self._options.clear()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()

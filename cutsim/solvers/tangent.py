@@ -1,0 +1,124 @@
+"""The tangent matrix and how it is filled."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from dolfinx import fem, la
+from dolfinx.fem import petsc
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.terms import Term
+from cutsim.solvers.preconditioners import rigid_body_modes
+
+
+class Tangent:
+    """PETSc matrix of a bilinear form on one space with itself. Every method is collective.
+
+    On one rank PETSc works on the arrays of a dolfinx matrix, into which the cells are inserted in half the time; on
+    several ranks dolfinx inserts into PETSc's own matrix.  Terms that assemble themselves have a matrix of their own,
+    with a pattern of its own; the sum of both is a third one.
+
+    Args:
+        a: The compiled form.
+        V: Its space; displacements give the matrix their rigid-body modes as near-nullspace.
+        symmetric: Whether it is symmetric.
+        terms: Terms that assemble themselves.
+
+    Attributes:
+        A: The matrix.
+    """
+
+    def __init__(self, a: fem.Form, V: fem.FunctionSpace, symmetric: bool, terms: Sequence[Term] = ()) -> None:
+        self._a, self._V, self._symmetric, self._terms = a, V, symmetric, tuple(terms)
+        if V.mesh.comm.size == 1:
+            self._csr = fem.create_matrix(a, block_mode=la.BlockMode.expanded)
+            n = len(self._csr.indptr) - 1
+            arrays = self._csr.indptr.astype(PETSc.IntType), self._csr.indices, self._csr.data
+            self._forms = PETSc.Mat().createAIJWithArrays((n, n), arrays, comm=V.mesh.comm)
+            self._forms.setBlockSize(V.dofmap.index_map_bs)
+        else:
+            self._csr = None
+            self._forms = petsc.create_matrix(a)
+        self._added: PETSc.Mat | None = None
+        self.A = self._forms
+        self._diagonal = self.A.createVecRight()
+        self.renew()
+
+    @property
+    def outdated(self) -> bool:
+        """Whether the pattern of a term has changed: `renew` before the next `assemble`."""
+        return self._patterns != tuple(term.pattern for term in self._terms)
+
+    def renew(self) -> None:
+        """Make the matrix anew for the present patterns of the terms."""
+        self._patterns = tuple(term.pattern for term in self._terms)
+        if self._terms:
+            self._destroy_sum()
+            self._added = PETSc.Mat().create(self._forms.comm)
+            self._added.setSizes(self._forms.getSizes())
+            self._added.setBlockSize(self._V.dofmap.index_map_bs)
+            self._added.setType(PETSc.Mat.Type.AIJ)
+            self._added.setUp()
+            for term in self._terms:
+                term.add_pattern(self._added)
+            self._added.assemble()
+            # a matrix in which nothing was inserted would lose its pattern
+            self._assemble_forms(())
+            self.A = self._forms.copy()
+            self.A.axpy(1.0, self._added, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        self.A.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
+        if self._V.dofmap.index_map_bs == self._V.mesh.geometry.dim > 1:
+            self.A.setNearNullSpace(rigid_body_modes(self._V))
+
+    def assemble(self, bcs: Sequence[fem.DirichletBC]) -> None:
+        """Fill the matrix at the present state; constrained rows and columns are those of the identity."""
+        self._assemble_forms(bcs)
+        if self._added is not None:
+            self._add(self._added, bcs)
+        self.A.getDiagonal(self._diagonal)
+
+    def _assemble_forms(self, bcs: Sequence[fem.DirichletBC]) -> None:
+        if self._csr is None:
+            self._forms.zeroEntries()
+            petsc.assemble_matrix(self._forms, self._a, bcs)
+        else:
+            self._csr.set_value(0.0)
+            fem.assemble_matrix(self._csr, self._a, bcs)
+        self._forms.assemble()
+
+    def _add(self, added: PETSc.Mat, bcs: Sequence[fem.DirichletBC]) -> None:
+        added.zeroEntries()
+        for term in self._terms:
+            term.add_tangent(added)
+        added.assemble()
+        # for the time being the vector of the diagonal marks the free rows
+        self._diagonal.set(1.0)
+        for bc in bcs:
+            dofs = bc.dof_indices()[0]
+            self._diagonal.array[dofs[dofs < self._diagonal.local_size]] = 0.0
+        added.diagonalScale(self._diagonal, self._diagonal)
+        self.A.zeroEntries()
+        for part in (self._forms, added):
+            self.A.axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+
+    @property
+    def diagonal(self) -> NDArray[np.float64]:
+        """Owned part of the diagonal; zero before the first assembly."""
+        return self._diagonal.array_r
+
+    @property
+    def finite(self) -> bool:
+        """Whether there is neither NaN nor infinity on the diagonal."""
+        return bool(np.isfinite(self._diagonal.sum()))
+
+    def _destroy_sum(self) -> None:
+        if self._added is not None:
+            self._added.destroy()
+            self.A.destroy()
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self._destroy_sum()
+        self._forms.destroy()
+        self._diagonal.destroy()

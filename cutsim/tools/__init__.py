@@ -1,0 +1,1 @@
+"""Rigid tools: shapes, paths, and their contact with a body."""

@@ -1,0 +1,102 @@
+"""What all rigid tools have in common: a path, a force and a moment, the work on the body (docs/theory.md §4)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from dolfinx import default_scalar_type, fem
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.terms import Term
+from cutsim.fields.state import State
+from cutsim.interface.slip import SlipHistory
+from cutsim.tools.shapes import Path
+
+_AXES = "xyz"
+_Action = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+class RigidTool(Term):
+    """A rigid tool whose reference point follows a path without turning.
+
+    Args:
+        state: Displacement and time.
+        path: Motion of the reference point.
+        name: Name in messages and output.
+
+    Attributes:
+        position: Present position of the reference point.
+
+    Raises:
+        ValueError: The path has another dimension than the mesh.
+    """
+
+    def __init__(self, state: State, path: Path, name: str) -> None:
+        gdim = state.mesh.geometry.dim
+        start = np.asarray(path.position(0.0), dtype=float)
+        require("path", start.shape, start.shape == (gdim,), f"positions of {gdim} components")
+        self.name, self.state, self.path = name, state, path
+        self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
+        self._position_old = start.copy()
+        self._action: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
+        self._action_old: _Action = self._action
+
+    @property
+    def slips(self) -> Sequence[SlipHistory]:
+        """Memory of friction of the surfaces that the tool touches."""
+        return ()
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which the tool's velocity jumps."""
+        return self.path.corners
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """Increment of the tool's position in the step [length]."""
+        return np.asarray(self.position.value - self._position_old)
+
+    def act(self, force: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
+        """Note force and moment on the tool in the trial state, for `evaluate`."""
+        self._action = force, moment
+
+    def begin(self, time: float) -> None:
+        """Move the tool to its position at the end of the step."""
+        self.position.value[:] = self.path.position(time)
+
+    def external_work(self) -> float:
+        """Work of the tool on the body in the step: mean force times increment. Collective."""
+        return float(-0.5 * (self._action[0] + self._action_old[0]) @ self.displacement)
+
+    def force(self) -> NDArray[np.float64]:
+        """Force on the tool in the trial state, from the virtual work of a rigid translation [force]."""
+        return self._action[0]
+
+    def moment(self) -> NDArray[np.float64]:
+        """Moment on the tool about its reference point, from the virtual work of a rigid rotation."""
+        return self._action[1]
+
+    def record(self) -> dict[str, tuple[float, str]]:
+        """Position, force and moment of the tool, areas that stick and slip. Collective."""
+        force, couple = self.force(), self.moment()
+        gdim = len(force)
+        columns = {f"{self.name}_{_AXES[i]}": (float(self.position.value[i]), "length") for i in range(gdim)}
+        columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
+        axes = _AXES if gdim == 3 else "z"
+        if not self.state.axisymmetric:  # moments of a ring balance each other
+            columns |= {f"{self.name}_moment_{a}": (float(m), "moment") for a, m in zip(axes, couple, strict=True)}
+        if self.slips:
+            sticks, slips = np.sum([slip.areas() for slip in self.slips], axis=0)
+            kind = self.state.facet_measure
+            columns |= {f"{self.name}_sticking": (float(sticks), kind), f"{self.name}_slipping": (float(slips), kind)}
+        return columns
+
+    def rollback(self) -> None:
+        """Move the tool back to the start of the step."""
+        self.position.value[:] = self._position_old
+        self._action = self._action_old
+
+    def commit(self) -> None:
+        """Adopt position, force and moment."""
+        self._position_old[:] = self.position.value
+        self._action_old = self._action

@@ -1,0 +1,193 @@
+"""A rigid tool in the body: contact on outer surfaces and crack faces, friction, reactions (docs/theory.md §4)."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from cutsim.base.assembly import integrate, moment, nodal_forces, resultant
+from cutsim.base.checks import require
+from cutsim.base.compat import form
+from cutsim.base.kinematics import Expr, tangential
+from cutsim.base.parameters import with_constants
+from cutsim.fields.points import Surface, Values
+from cutsim.fields.state import State
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.slip import SlipHistory, completed
+from cutsim.tools.rigid_tool import RigidTool
+from cutsim.tools.shapes import Path, Shape
+
+logger = logging.getLogger(__name__)
+
+
+class Patch:
+    """A rigid tool on one surface: gap, pressure, friction.
+
+    Args:
+        state: Displacement and time.
+        surface: The surface.
+        shape: Signed distance of the tool.
+        position: Its present position.
+        contact: Contact law.
+        friction: Friction law with a tangential penalty, or None.
+        temperature: Temperature of the body, for friction laws that depend on it.
+
+    Attributes:
+        surface: The surface.
+        slip: Memory of friction, None without friction.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        surface: Surface,
+        shape: Shape,
+        position: fem.Constant,
+        contact: PenaltyContact,
+        friction: FrictionLaw | None,
+        temperature: fem.Function | None,
+    ) -> None:
+        self.surface = surface
+        place = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
+        x = ufl.variable(place)
+        self._normal = ufl.diff(shape.distance(x), x)
+        self._contact = with_constants(state.mesh, contact)
+        self._penetration = -shape.distance(place)
+        self._pressure = self._contact.pressure(self._penetration)
+        self.slip: SlipHistory | None = None
+        if friction is not None:
+            self.slip = SlipHistory(
+                state,
+                surface.points,
+                friction,
+                surface.restrict(state.u) - position,
+                self._pressure,
+                project=lambda slip: tangential(slip, self._normal),
+                temperature=None if temperature is None else surface.restrict(temperature),
+            )
+
+    def virtual_work(self, v: Expr) -> ufl.Form:
+        """Virtual work −∫ (p ∇d − t)·v of pressure and friction on the body."""
+        traction = self._pressure * self._normal
+        if self.slip is not None:
+            traction -= self.slip.traction
+        return -ufl.dot(traction, self.surface.restrict(v)) * self.surface.measure
+
+    def energy(self) -> ufl.Form:
+        """Energy of the contact penalty."""
+        return self._contact.energy(self._penetration) * self.surface.measure
+
+    @cached_property
+    def _evaluate(self):  # type: ignore[no-untyped-def]
+        return self.surface.points.evaluator({"pressure": self._pressure})
+
+    def pressure(self) -> Values:
+        """Present contact pressure at the points [stress]. Collective."""
+        return self._evaluate()["pressure"]
+
+    def dissipation(self) -> Values:
+        """Friction dissipation of the trial step at the points [energy per reference area]."""
+        return np.zeros_like(self.surface.points.weights) if self.slip is None else self.slip.dissipation()
+
+
+class ToolContact(RigidTool):
+    """Contact between a moving rigid tool and some surfaces of the body.
+
+    Args:
+        state: Displacement and time.
+        shape: Signed distance of the tool.
+        path: Motion of its reference point.
+        surfaces: Surfaces the tool can touch; each side of a crack by itself.
+        contact: Contact law; the pressure acts per reference area.
+        friction: Friction law against the slip relative to the tool, None for a frictionless tool; without a tangential
+            penalty of its own it takes that of the contact law.
+        temperature: Temperature of the body, for friction laws that depend on it.
+        name: Name in messages and output.
+
+    Attributes:
+        patches: The tool on each surface.
+
+    Raises:
+        ValueError: No surface is given, or the path has another dimension than the mesh.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        shape: Shape,
+        path: Path,
+        surfaces: Sequence[Surface],
+        *,
+        contact: PenaltyContact,
+        friction: FrictionLaw | None = None,
+        temperature: fem.Function | None = None,
+        name: str = "tool",
+    ) -> None:
+        super().__init__(state, path, name)
+        require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
+        self.shape, self.contact, self.friction = shape, contact, friction
+        self.symmetric = friction is None
+        law = None if friction is None else completed(friction, contact.stiffness)
+        self.patches = tuple(Patch(state, s, shape, self.position, contact, law, temperature) for s in surfaces)
+        self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
+        self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
+
+    @property
+    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+        """Maps from facets of the mesh to the points of the surfaces."""
+        return {mesh: cells for p in self.patches for mesh, cells in p.surface.points.entity_maps.items()}
+
+    @property
+    def slips(self) -> Sequence[SlipHistory]:
+        """Memory of friction of the surfaces."""
+        return [p.slip for p in self.patches if p.slip is not None]
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Virtual work of pressure and friction on the body."""
+        return sum((p.virtual_work(v) for p in self.patches), start=ufl.Form([]))
+
+    def evaluate(self) -> None:
+        """Contact forces, slip and friction work of the trial state. Collective."""
+        comm, gdim = self.state.mesh.comm, self.state.mesh.geometry.dim
+        forces = nodal_forces(self._contact_form)
+        nodes = len(forces) // gdim
+        arms = self.state.V.tabulate_dof_coordinates()[:nodes].copy()
+        arms[:, :gdim] += self.state.u.x.array[: nodes * gdim].reshape(-1, gdim) - self.position.value
+        self.act(resultant(comm, forces, gdim), moment(comm, forces, arms, gdim))
+        for slip in self.slips:
+            slip.evaluate()
+
+    def energies(self) -> dict[str, float]:
+        """Energy of the contact penalties and friction work so far. Collective."""
+        total = {"contact": integrate(self._energy_form), "friction": 0.0}
+        for slip in self.slips:
+            for entry, value in slip.energies().items():
+                total[entry] += value
+        return total
+
+    def rollback(self) -> None:
+        """Move the tool back to the start of the step."""
+        super().rollback()
+        for slip in self.slips:
+            slip.rollback()
+
+    def commit(self) -> None:
+        """Adopt position, forces and slip."""
+        super().commit()
+        for slip in self.slips:
+            slip.commit()
+
+
+def warn_coarse(name: str, shape: Shape, facet_size: float) -> None:
+    """Warn with numbers if facets are larger than the smallest radius of a tool."""
+    if facet_size > (1 + 1e-6) * shape.resolution:
+        logger.warning(
+            "%s: facets of %.3g do not resolve the tool's radius %.3g: use %.3g or less",
+            name, facet_size, shape.resolution, shape.resolution,
+        )  # fmt: skip

@@ -1,0 +1,144 @@
+"""A rigid tool whose surface is made of triangles, or of segments in 2-D (docs/theory.md §3.5, §4)."""
+
+from collections.abc import Sequence
+
+import basix
+import numpy as np
+from dolfinx import fem
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.assembly import add_blocks, moment
+from cutsim.base.checks import require
+from cutsim.base.terms import AssembledTerm
+from cutsim.fields.sizes import facet_size
+from cutsim.fields.state import State
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.slip import SlipHistory
+from cutsim.pairs.kinematics import PairKinematics
+from cutsim.pairs.law import PairLaws
+from cutsim.pairs.outer_surface import OuterSurface
+from cutsim.pairs.pairing import Array, Indices, Shape
+from cutsim.pairs.surface_pass import SurfacePass, slave_points
+from cutsim.tools.rigid_tool import RigidTool
+from cutsim.tools.shapes import Path
+from cutsim.tools.triangulation import Triangulation
+
+
+class RigidSurface:
+    """A triangulation that moves with a tool, as `cutsim.pairs.outer_surface.Master`.
+
+    Args:
+        triangulation: The surface, relative to the reference point.
+        now: Present position of the reference point; it is read whenever the surface is asked for.
+        before: Its position at the start of the step, likewise.
+    """
+
+    def __init__(self, triangulation: Triangulation, now: fem.Constant, before: Array) -> None:
+        kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[triangulation.points.shape[1]]
+        self.shape = Shape(basix.create_element(basix.ElementFamily.P, kind, 1))
+        self._corners, self._now, self._before = triangulation.corners, now, before
+        self.sides: Array = np.ones(len(self._corners))
+        self.reference: Array = self._corners + before
+        self.global_nodes: Indices = np.full(triangulation.facets.shape, -1)
+
+    def nodes(self, u: Array, *, start: bool) -> Array:
+        """Current nodes of the facets, at the start or the end of the step, whatever the displacement."""
+        return self._corners + (self._before if start else self._now.value)
+
+    def gather(self, values: Array) -> Array:
+        """Zero: the surface has no unknowns."""
+        return np.zeros_like(self._corners)
+
+
+class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
+    """Contact between a rigid tool of triangles and an outer surface of the body.
+
+    The points of the body find the tool along their own normals, as in a pair of surfaces: the traction turns with the
+    surface of the body and is continuous where points slide over the edges of the triangles.
+
+    Args:
+        state: Displacement, of degree 1 or 2, and time.
+        facets: Local exterior facets that the tool can touch, ghosts included.
+        surface: Surface of the tool relative to its reference point, the same on all ranks.
+        path: Motion of the reference point.
+        contact: Contact law; the pressure acts per reference area.
+        friction: Friction law, None for none; without a tangential penalty of its own it takes that of the contact law.
+        search: Largest distance of a partner, on either side, beyond what the tool moves in the step [length]; by
+            default the mean size of the facets.
+        name: Name in messages and output.
+
+    Raises:
+        ValueError: A parameter is outside its range, or path or surface have another dimension than the mesh.
+    """
+
+    symmetric = False
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        surface: Triangulation,
+        path: Path,
+        *,
+        contact: PenaltyContact,
+        friction: FrictionLaw | None = None,
+        search: float | None = None,
+        name: str = "tool",
+    ) -> None:
+        super().__init__(state, path, name)
+        gdim = state.mesh.geometry.dim
+        require("search", search, search is None or search > 0, "> 0 or None")
+        require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
+        points = slave_points(state, facets)
+        size = points.mean(facet_size(state.mesh, points.facets))
+        master = RigidSurface(surface, self.position, self._position_old)
+        self._search = search or size
+        slave = OuterSurface(state.V, points.facets)
+        kinematics = PairKinematics(slave, master, fixed=False, search=self._search, size=size)
+        laws = PairLaws(None, contact, friction, None, None)
+        self.touch = SurfacePass(state, points, kinematics, laws, weight=1.0)
+        self.passes = (self.touch,)
+
+    @property
+    def slips(self) -> Sequence[SlipHistory]:
+        """Memory of friction of the surface."""
+        return [] if self.touch.slip is None else [self.touch.slip]
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros for all facets: the pattern never changes. Collective."""
+        slave = self.touch.kinematics.slave
+        dofs = self.touch.dofs(slave.global_nodes[slave.owned])
+        add_blocks(A, dofs, np.zeros((*dofs.shape, dofs.shape[1])))
+
+    def begin(self, time: float) -> None:
+        """Move the tool; the slide of the step counts from the committed displacement."""
+        super().begin(time)
+        # at first the body has not given way: it is in the tool as deep as that has moved
+        self.touch.kinematics.search = self._search + float(np.linalg.norm(self.displacement))
+        self.touch.begin()
+
+    def evaluate(self) -> None:
+        """Trial history, force and moment of the step. Collective."""
+        self.touch.evaluate()
+        pairs, gdim = self.touch.partners(), self.state.mesh.geometry.dim
+        points = pairs.hits.points
+        arms = np.zeros((len(points), 3))
+        arms[:, :gdim] = pairs.slave.x[points] + pairs.distance - self.position.value
+        forces = -self.touch.point_forces()[points]
+        self.act(-self.touch.force, moment(self.state.mesh.comm, forces.ravel(), arms, gdim))
+
+    def energies(self) -> dict[str, float]:
+        """Energy of the contact penalty, friction work, and work of the pressure that neither holds. Collective."""
+        return self.touch.energies()
+
+    def rollback(self) -> None:
+        """Forget the trial step."""
+        super().rollback()
+        self.touch.rollback()
+
+    def commit(self) -> None:
+        """Adopt the trial step."""
+        self.touch.commit()
+        super().commit()
