@@ -10,13 +10,13 @@ import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
 
+from cutsim.analysis.stepping import Problem, StepError, StepReport
 from cutsim.base.checks import require
-from cutsim.interface.crack import Crack
 from cutsim.base.kinematics import Expr
+from cutsim.base.units import Units
+from cutsim.interface.crack import Crack
 from cutsim.results.output import FieldWriter, HistoryWriter
 from cutsim.results.progress import Progress
-from cutsim.analysis.stepping import Problem, StepError, StepReport
-from cutsim.base.units import Units
 
 Columns = dict[str, tuple[float, str]]
 
