@@ -11,8 +11,8 @@ import pyvista
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from cutsim import pictures, plots
 from cutsim.fields.space import cracked_space
+from cutsim.results import pictures, plots
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 
