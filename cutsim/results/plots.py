@@ -76,8 +76,7 @@ def plot_curves(
         for label, level in (references or {}).items():
             axes.axhline(level, color="0.35", linewidth=1.2, linestyle="--", zorder=1)
             axes.annotate(
-                label, (0.99, level), (0, 4), xycoords=("axes fraction", "data"), textcoords="offset points",
-                ha="right", color="0.25", fontsize=9, bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 0.5},
+                label, (1.01, level), xycoords=("axes fraction", "data"), va="center", color="0.25", fontsize=9,
             )  # fmt: skip
         if axes.get_legend_handles_labels()[0]:
             axes.legend()
