@@ -23,6 +23,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb, FrictionLaw, SmoothCoulomb
+from cutsim.interface.ppr import ParkPaulinoRoesler
 from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.materials.directions import piecewise_direction
 from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
@@ -72,6 +73,7 @@ __all__ = [
     "Newmark",
     "Ogden",
     "PairHeat",
+    "ParkPaulinoRoesler",
     "Path",
     "PenaltyContact",
     "Plane",

@@ -1,11 +1,12 @@
 """Parameters and damage of the cohesive laws; what they do in a crack is in test_crack."""
 
+from dataclasses import replace
 from math import e, sqrt
 
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, EXPONENTIAL
+from conftest import BILINEAR, EXPONENTIAL, PPR
 
 from cutsim.interface.cohesive import Bilinear, Exponential, process_zone_element
 
@@ -84,6 +85,40 @@ def test_damage_starts_at_the_peak_and_ends_at_one():
 
 def test_damage_of_the_bilinear_law_is_its_history():
     assert damage(BILINEAR, 0.4) == [0.4, 0.4]
+
+
+def test_damage_of_the_law_of_park_paulino_and_roesler():
+    """It starts at the peaks and is one from the final jumps on, 0.15 and 0.2 of which the peaks are at."""
+    normal, tangential = PPR.final
+    shear = sqrt(PPR.G_II / PPR.G_I) * tangential
+    for mode, peak, final in ((0, 0.15 * normal, normal), (1, 0.2 * shear, shear)):
+        assert damage(PPR, 0.999 * peak)[mode] == 0
+        values = np.array([damage(PPR, k)[mode] for k in np.linspace(peak, 1.2 * final, 100)])
+        assert (np.diff(values) >= 0).all() and values[0] == pytest.approx(0, abs=1e-12) and values[-1] == 1
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"t_n": 0.0}, "t_n = 0.0"),
+        ({"beta": 1.0}, "beta = 1.0 is not allowed.*> 1"),
+        ({"peak_n": 0.6}, r"peak_n = 0.6 is not allowed.*0\.577"),
+    ],
+)
+def test_park_paulino_and_roesler_refuse(changed, message):
+    with pytest.raises(ValueError, match=message):
+        replace(PPR, **changed)
+
+
+def test_initially_rigid_law():
+    """T = t (1 − δ/δ_c) but for a rise over at most a hundredth of δ_c = 2 G/t."""
+    law = Bilinear.rigid(2.0, 0.2, 3.0, 0.5)
+    for delta in (0.01, 0.05, 0.15):
+        kappa = law.demand(ufl.as_ufl(delta), ufl.as_ufl(0.0))
+        traction = float(law.stiffness(delta, 0.0, float(kappa(())))[0]) * delta
+        assert traction == pytest.approx(2.0 * (1 - delta / 0.2), rel=0.011)
+    with pytest.raises(ValueError, match="rise = 1"):
+        Bilinear.rigid(2.0, 0.2, 3.0, 0.5, rise=1)
 
 
 def test_element_that_resolves_the_process_zone():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, EXPONENTIAL, NU, E, history, make_blocks, rotation
+from conftest import BILINEAR, EXPONENTIAL, NU, PPR, E, history, make_blocks, rotation
 from dolfinx import fem, la
 
 from cutsim.analysis.mechanics import Mechanics
@@ -39,6 +39,27 @@ def bilinear(law, sliding, opening, largest):
     return k * sliding, k * max(opening, 0) + PENALTY.stiffness * min(opening, 0), max(d, largest)
 
 
+def ppr(law, sliding, opening, largest):
+    """Park, Paulino and Roesler (2009), as printed: tractions and the new history."""
+    beta = np.sqrt(law.toughness[1] / law.toughness[0])
+    effective = np.hypot(max(opening, 0), beta * sliding)
+    largest = max(largest, effective)
+    r = largest / effective if effective else 1.0
+    (d_n, d_t), phi_n, phi_t = law.final, law.G_I, law.G_II
+    m = law.alpha * (law.alpha - 1) * law.peak_n**2 / (1 - law.alpha * law.peak_n**2)
+    n = law.beta * (law.beta - 1) * law.peak_t**2 / (1 - law.beta * law.peak_t**2)
+    gamma_n, gamma_t = (law.alpha / m) ** m, (law.beta / n) ** n
+    gamma_n, gamma_t = (gamma_n, -phi_t * gamma_t) if phi_n < phi_t else (-phi_n * gamma_n, gamma_t)
+    x, y = r * max(opening, 0) / d_n, r * abs(sliding) / d_t
+    f = gamma_n * (1 - x) ** law.alpha * (m / law.alpha + x) ** m if x < 1 else 0.0
+    g = gamma_t * (1 - y) ** law.beta * (n / law.beta + y) ** n if y < 1 else 0.0
+    across, along = g + max(phi_t - phi_n, 0), f + max(phi_n - phi_t, 0)
+    # f' and g', zero where the other mode has broken the bond
+    df = f * (m / (m / law.alpha + x) - law.alpha / (1 - x)) / d_n if x < 1 and across * f < 0 else 0.0
+    dg = g * (n / (n / law.beta + y) - law.beta / (1 - y)) / d_t if y < 1 and along * g < 0 else 0.0
+    return np.sign(sliding) * dg * along / r, df * across / r + PENALTY.stiffness * min(opening, 0), largest
+
+
 # waypoints (sliding, opening) in units of the characteristic openings: load, unload, press, load again, break
 LOOPS = {
     "opening": [(0, 0), (0, 2), (0, 0), (0, -0.05), (0, 3), (0, 0.5), (0, 14)],
@@ -50,6 +71,7 @@ LOOPS = {
 LAWS = {
     "exponential": (EXPONENTIAL, exponential, (EXPONENTIAL.eps_t, EXPONENTIAL.eps_n)),
     "bilinear": (BILINEAR, bilinear, (0.05, 0.02)),
+    "ppr": (PPR, ppr, (PPR.peak_t * PPR.final[1], PPR.peak_n * PPR.final[0])),
 }
 
 

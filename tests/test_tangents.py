@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, EXPONENTIAL, NU, E, make_blocks, slopes
+from conftest import BILINEAR, EXPONENTIAL, NU, PPR, E, make_blocks, slopes
 from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_matrix
 
@@ -140,7 +140,12 @@ JUMPS = {
     "compression": (0.8, -0.3, 0.0),
     "compression of the damaged bond": (0.8, -0.3, 3.0),
 }
-LAWS = {"exponential": (EXPONENTIAL, 0.1), "bilinear": (BILINEAR, 0.02), "contact only": (None, 0.1)}
+LAWS = {
+    "exponential": (EXPONENTIAL, 0.1),
+    "bilinear": (BILINEAR, 0.02),
+    "ppr": (PPR, 0.05),
+    "contact only": (None, 0.1),
+}
 
 
 def separated(b, sliding, opening, wobble):
@@ -157,7 +162,7 @@ BARE = [("contact only", "current", "compression")]
 
 @pytest.mark.parametrize(
     ("law", "normal", "jump"),
-    [*itertools.product(("exponential", "bilinear"), ("current", "reference"), JUMPS), *BARE],
+    [*itertools.product(("exponential", "bilinear", "ppr"), ("current", "reference"), JUMPS), *BARE],
 )
 def test_crack(law, normal, jump):
     sliding, opening, kappa = JUMPS[jump]

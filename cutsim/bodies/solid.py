@@ -45,7 +45,7 @@ class Solid(Term):
             part depends on det F only, and without thermal expansion.
         viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
         relaxation: Prony series by which all but the volumetric part relaxes; the material is then the relaxed one.
-            The stresses of the methods below are without overstress.
+            The strain energy in the audit is then with what the overstresses store.
         density: Mass per reference volume, > 0; needed by dynamics and heat only [mass/length³].
         thermoelastic: Thermal expansion and shear modulus that depends on temperature.
         temperature: The temperature that acts on the body; with `thermoelastic` only.
@@ -128,11 +128,13 @@ class Solid(Term):
         return self._deformation_gradient(u, self._temperature())
 
     def first_piola(self, u: Expr) -> Expr:
-        """First Piola–Kirchhoff stress P = ∂W/∂F, 3 × 3 [stress]."""
+        """First Piola–Kirchhoff stress P = ∂W/∂F with overstresses, 3 × 3 [stress]."""
         F = ufl.variable(self.deformation_gradient(u))
         if self._mixed is not None:
-            return ufl.diff(self._energy(F, None)[0], F) + self._mixed.pressure * cofactor(F)
-        return ufl.diff(sum(self._energy(F, self._temperature())), F)
+            P = ufl.diff(self._energy(F, None)[0], F) + self._mixed.pressure * cofactor(F)
+        else:
+            P = ufl.diff(sum(self._energy(F, self._temperature())), F)
+        return P if self._overstress is None else P + self._overstress.piola(F)
 
     def cauchy_stress(self, u: Expr) -> Expr:
         """Cauchy stress σ = P Fᵀ / J, 3 × 3 [stress]."""
@@ -196,8 +198,11 @@ class Solid(Term):
     def energies(self) -> dict[str, float]:
         """Strain energy, work of viscous stresses and minus the strain energy brought by heat so far. Collective."""
         self.prepare()
-        viscous = self._viscous + (0.0 if self._overstress is None else self._overstress.work)
-        return {"strain": integrate(self._energy_form), "viscous": viscous, "thermoelastic": self._thermal}
+        strain, viscous = integrate(self._energy_form), self._viscous
+        if self._overstress is not None:
+            strain += self._overstress.energies.stored
+            viscous += self._overstress.energies.lost
+        return {"strain": strain, "viscous": viscous, "thermoelastic": self._thermal}
 
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""
@@ -253,10 +258,10 @@ class Solid(Term):
         return first, second
 
     def _relaxing(self, relaxation: Prony) -> Overstress:
-        F = ufl.variable(self.deformation_gradient(self.state.u))
-        energy = self._energy(F, self._temperature())[0]
-        stress = ufl.inv(F) * ufl.diff(energy, F)
-        return Overstress(self.state, relaxation, energy, stress, self.measures[0], self.cells)
+        def energy(F: Expr) -> Expr:
+            return self._energy(F, self._temperature())[0]
+
+        return Overstress(self.state, relaxation, energy, self.measures[0], self.cells, scale=self.material.young)
 
     def _temperature(self) -> Expr | None:
         return None if self.temperature is None else self.temperature.value

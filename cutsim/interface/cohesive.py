@@ -207,6 +207,21 @@ class Bilinear:
         least = max(self.t_n**2 / (2 * self.G_I), self.t_t**2 / (2 * self.G_II))
         require("penalty", self.penalty, self.penalty > least, f"> strength²/(2 toughness) = {least:g}")
 
+    @classmethod
+    def rigid(cls, t_n: float, G_I: float, t_t: float, G_II: float, eta: float = 2.0, rise: float = 0.01) -> "Bilinear":
+        """Make the initially rigid, linear law T = t (1 − δ/δ_c): the intact bond is so stiff that it hardly opens.
+
+        Args:
+            t_n: Normal strength [stress].
+            G_I: Toughness in opening [force/length].
+            t_t: Shear strength [stress].
+            G_II: Toughness in sliding [force/length].
+            eta: Exponent η of the Benzeggagh–Kenane criterion [–].
+            rise: Largest part of the final jump that the rise to the peak takes, in either mode, in (0, 1) [–].
+        """
+        require("rise", rise, 0 < rise < 1, "in (0, 1)")
+        return cls(max(t_n**2 / (2 * G_I), t_t**2 / (2 * G_II)) / rise, t_n, G_I, t_t, G_II, eta)
+
     @property
     def strength(self) -> float:
         """Largest normal traction t_n [stress]."""

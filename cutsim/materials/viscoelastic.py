@@ -12,6 +12,7 @@ so that the parameters of the material are those of slow deformation.  For S tha
 is exact (Taylor, Pister and Goudreau 1970; Simo 1987).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import basix
@@ -21,10 +22,11 @@ import ufl
 from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
-from cutsim.base.assembly import integrate
 from cutsim.base.checks import require
-from cutsim.base.compat import expression, form
-from cutsim.base.kinematics import Expr
+from cutsim.base.compat import expression
+from cutsim.base.kinematics import Expr, green_lagrange
+from cutsim.materials.elastic.maxwell import Maxwell
+from cutsim.materials.elastic.spring import Spring
 from cutsim.fields.state import State
 
 Array = NDArray[np.float64]
@@ -67,101 +69,104 @@ class Overstress:
     Args:
         state: Displacement and time.
         prony: Relaxation function.
-        energy: Strain energy per reference volume that relaxes, at `state.u`.
-        stress: Its second Piola–Kirchhoff stress, 3 × 3, at `state.u`.
+        energy: Strain energy per reference volume that relaxes, as a function of the deformation gradient.
         measure: Measure over the body whose integration points carry the history.
         cells: Local cells of the body (ghosts included); all by default.
+        scale: A stress by which to judge whether strains have converged, such as Young's modulus.
+
+    Attributes:
+        energies: What the overstresses store and dissipate.
     """
 
     def __init__(
         self,
         state: State,
         prony: Prony,
-        energy: Expr,
-        stress: Expr,
+        energy: Callable[[Expr], Expr],
         measure: ufl.Measure,
         cells: NDArray[np.int32] | None = None,
+        *,
+        scale: float,
     ) -> None:
         mesh, gdim = state.mesh, state.mesh.geometry.dim
         self._state, self._prony, self._energy, self._dx = state, prony, energy, measure
-        self._gradient = state.deformation_gradient
         index_map = mesh.topology.index_map(mesh.topology.dim)
         self._cells = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32) if cells is None else cells
-        # strain has no component out of the plane but around an axis
-        self._pairs = [(i, j) for i in range(gdim) for j in range(i, gdim)] + [(2, 2)] * state.axisymmetric
+        self._pairs = [(i, j) for i in range(gdim) for j in range(i, gdim)] + [(2, 2)] * (gdim == 2)
+        self._conjugate = np.array([1.0 if i == j else 2.0 for i, j in self._pairs])
         degree, name = measure.metadata()["quadrature_degree"], mesh.topology.cell_name()
-        element = basix.ufl.quadrature_element(name, value_shape=(len(self._pairs),), degree=degree)
-        space = fem.functionspace(mesh, element)
-        self._dofs = space.dofmap.list[self._cells]
         points = basix.make_quadrature(basix.CellType[name], degree)[0]
-        self._stress = expression(ufl.as_vector([stress[i, j] for i, j in self._pairs]), points, mesh)
+        shapes = (len(self._pairs),), ()
+        elements = (basix.ufl.quadrature_element(name, value_shape=shape, degree=degree) for shape in shapes)
+        space, scalars = (fem.functionspace(mesh, element) for element in elements)
+        self._dofs = space.dofmap.list[self._cells]
+        F = state.deformation_gradient(state.u)
+        entries = [tensor[i, j] for tensor in (self._stress(F), green_lagrange(F)) for i, j in self._pairs]
+        self._response = expression(ufl.as_vector(entries), points, mesh)
         # in a step the overstress is known + weight × stress
-        self._known, self._total, self._total_old = (fem.Function(space) for _ in range(3))
+        self._known = fem.Function(space)
         self._weight = fem.Constant(mesh, default_scalar_type(0.0))
         self._before: tuple[float, Array] = (0.0, self._known.x.array.copy())
-        self._S: Array = self._evaluate_stress()
+        strain, self._S = self._evaluate()
         self._h: Array = np.zeros((len(prony.times), *self._S.shape))
         self._S_old, self._h_old = self._S, self._h
         self._decay: Array = np.ones(len(prony.times))
         self._gain: Array = np.zeros(len(prony.times))
-        self._work_form = form(self._work_of_step())
-        self._work = self._work_old = 0.0
-
-    @property
-    def work(self) -> float:
-        """Work done on the overstresses so far: what they have dissipated, and what they will give back [energy]."""
-        return self._work
+        spring = Spring(mesh, energy, self._pairs, self._cells, degree, scale)
+        self.energies = Maxwell(spring, np.array(prony.strengths), fem.Function(scalars), measure, strain)
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of the overstresses."""
         u = self._state.u
-        changing = ufl.derivative(self._weight * self._energy * self._dx, u, v)
-        return changing + ufl.inner(self._piola(u, self._known), ufl.derivative(self._gradient(u), u, v)) * self._dx
+        F = self._state.deformation_gradient(u)
+        changing = ufl.derivative(self._weight * self._energy(F) * self._dx, u, v)
+        return changing + ufl.inner(F * self._tensor(self._known), ufl.derivative(F, u, v)) * self._dx
+
+    def piola(self, F: Expr) -> Expr:
+        """First Piola–Kirchhoff stress of the overstresses at the end of the step, 3 × 3 [stress]."""
+        return F * (self._weight * self._stress(F) + self._tensor(self._known))
 
     def begin(self) -> None:
         """Factors of the step whose size the state knows."""
         self._before = float(self._weight.value), self._known.x.array.copy()
         self._decay, self._gain = self._prony.factors(float(self._state.dt.value))
         self._weight.value = self._gain.sum()
-        self._set(self._known, np.tensordot(self._decay, self._h_old, 1) - self._gain.sum() * self._S_old)
+        known = np.tensordot(self._decay, self._h_old, 1) - self._gain.sum() * self._S_old
+        self._known.x.array.reshape(-1, len(self._pairs))[self._dofs] = known
 
     def evaluate(self) -> None:
-        """Overstresses at the end of the step, and their work. Collective."""
-        self._S = self._evaluate_stress()
+        """Overstresses at the end of the step, and their energies. Collective."""
+        strain, self._S = self._evaluate()
         broadcast = (-1, 1, 1, 1)
         change = self._gain.reshape(broadcast) * (self._S - self._S_old)
         self._h = self._decay.reshape(broadcast) * self._h_old + change
-        self._set(self._total, self._h.sum(axis=0))
-        self._work = self._work_old + integrate(self._work_form)
+        steps = float(self._state.dt.value) / np.array(self._prony.times)
+        self.energies.evaluate(strain, self._conjugate * self._S, self._conjugate * self._h, steps)
 
     def rollback(self) -> None:
         """Forget the step."""
         self._weight.value, self._known.x.array[:] = self._before
-        self._S, self._h, self._work = self._S_old, self._h_old, self._work_old
-        self._total.x.array[:] = self._total_old.x.array
+        self._S, self._h = self._S_old, self._h_old
+        self.energies.rollback()
 
     def commit(self) -> None:
         """Adopt the overstresses of the step."""
-        self._S_old, self._h_old, self._work_old = self._S, self._h, self._work
-        self._total_old.x.array[:] = self._total.x.array
+        self._S_old, self._h_old = self._S, self._h
+        self.energies.commit()
 
-    def _evaluate_stress(self) -> Array:
-        """Stress at the integration points, shape (cells, points, components)."""
-        values = self._stress.eval(self._state.mesh, self._cells)
-        return np.array(values).reshape(*self._dofs.shape, len(self._pairs))
+    def _evaluate(self) -> tuple[Array, Array]:
+        """Strain and stress at the integration points, shape (cells, points, components) each."""
+        values = np.array(self._response.eval(self._state.mesh, self._cells))
+        stress, strain = np.split(values.reshape(*self._dofs.shape, 2 * len(self._pairs)), 2, axis=-1)
+        return strain, stress
 
-    def _set(self, f: fem.Function, values: Array) -> None:
-        f.x.array.reshape(-1, len(self._pairs))[self._dofs] = values
+    def _stress(self, F: Expr) -> Expr:
+        """Second Piola–Kirchhoff stress S of the energy that relaxes, 3 × 3."""
+        F = ufl.variable(F)
+        return ufl.inv(F) * ufl.diff(self._energy(F), F)
 
-    def _piola(self, u: Expr, f: fem.Function) -> Expr:
-        """First Piola–Kirchhoff stress of a symmetric second one, 3 × 3."""
+    def _tensor(self, f: fem.Function) -> Expr:
+        """The symmetric tensor of components, 3 × 3."""
         order = {pair: k for k, pair in enumerate(self._pairs)}
         places = [[order.get((min(i, j), max(i, j))) for j in range(3)] for i in range(3)]
-        H = ufl.as_matrix([[0 if k is None else f[k] for k in row] for row in places])
-        return self._gradient(u) * H
-
-    def _work_of_step(self) -> ufl.Form:
-        """Mean traction times increment, the rule by which the audit sums the work of the supports."""
-        new, old = self._state.u, self._state.u_old
-        mean = 0.5 * (self._piola(new, self._total) + self._piola(old, self._total_old))
-        return ufl.inner(mean, self._gradient(new) - self._gradient(old)) * self._dx
+        return ufl.as_matrix([[0 if k is None else f[k] for k in row] for row in places])

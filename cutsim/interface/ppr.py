@@ -1,0 +1,123 @@
+"""The cohesive law of Park, Paulino and Roesler (2009): shapes, strengths and toughnesses of both modes at will."""
+
+from dataclasses import dataclass
+from math import e
+
+import ufl
+
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr, positive_part
+
+
+@dataclass(frozen=True)
+class ParkPaulinoRoesler:
+    """Law with the potential Ψ of Park, Paulino and Roesler (J. Mech. Phys. Solids 57, 2009), often called PPR.
+
+    With x = δ_n/δ_nc, y = δ_t/δ_tc, f(x) = (1−x)^α (1 + αx/m)^m, g(y) = (1−y)^β (1 + βy/n)^n and Φ = max(φ_n, φ_t),
+    T_n = −f'(x)/δ_nc ⟨Φ g(y) − ⟨φ_t−φ_n⟩⟩ and T_t = −g'(y)/δ_tc ⟨Φ f(x) − ⟨φ_n−φ_t⟩⟩, each zero from its final
+    opening on.  m and n follow from the openings of the peaks, δ_nc and δ_tc from the strengths.  On the envelope the
+    work of separation depends on the path only as the potential says; unloading goes along the secant to the origin.
+
+    Args:
+        t_n: Normal strength > 0 [stress].
+        G_I: Toughness φ_n in opening > 0 [force/length].
+        t_t: Shear strength > 0 [stress].
+        G_II: Toughness φ_t in sliding > 0 [force/length].
+        alpha: Shape α > 1 of softening in opening: 2 is about linear, more is concave, less convex [–].
+        beta: Shape β > 1 of softening in sliding [–].
+        peak_n: Opening of the peak over the final one, 0 < λ_n < 1/√α [–].
+        peak_t: Sliding of the peak over the final one, 0 < λ_t < 1/√β [–].
+
+    Raises:
+        ValueError: A number is outside its range.
+    """
+
+    t_n: float
+    G_I: float
+    t_t: float
+    G_II: float
+    alpha: float = 3.0
+    beta: float = 3.0
+    peak_n: float = 0.1
+    peak_t: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("t_n", "G_I", "t_t", "G_II"):
+            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+        for name, peak in (("alpha", "peak_n"), ("beta", "peak_t")):
+            shape, place = getattr(self, name), getattr(self, peak)
+            require(name, shape, shape > 1, "> 1")
+            require(peak, place, 0 < place < shape**-0.5, f"in (0, 1/sqrt({name}) = {shape**-0.5:g})")
+
+    @property
+    def strength(self) -> float:
+        """Largest normal traction t_n [stress]."""
+        return self.t_n
+
+    @property
+    def final(self) -> tuple[float, float]:
+        """Opening δ_nc and sliding δ_tc at which the bond is broken in each pure mode [length]."""
+        normal = _slope(self.peak_n, self.alpha, self.peak_n) * self.G_I / self.t_n
+        return normal, _slope(self.peak_t, self.beta, self.peak_t) * self.G_II / self.t_t
+
+    @property
+    def opening(self) -> float:
+        """Normal opening G_I/(e t_n) of the exponential law with the same strength and toughness [length]."""
+        return self.G_I / (e * self.t_n)
+
+    @property
+    def toughness(self) -> tuple[float, float]:
+        """Works of separation (φ_n, φ_t) in the pure modes [force/length]."""
+        return self.G_I, self.G_II
+
+    def demand(self, opening: Expr, sliding: Expr) -> Expr:
+        """Effective jump √(⟨δ_n⟩² + β² δ_t²) with β² = φ_t/φ_n (thesis 4.22)."""
+        return ufl.sqrt(opening**2 + self.G_II / self.G_I * sliding**2 + (1e-8 * self.opening) ** 2)
+
+    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffnesses at the jump scaled to the envelope by r = κ/δ_eff (thesis 4.24)."""
+        r = kappa / self.demand(opening, sliding)
+        normal, tangential = self.final
+        x, y = r * opening / normal, r * sliding / tangential
+        larger = ufl.max_value(self.G_I, self.G_II)
+        across = positive_part(larger * _shape(y, self.beta, self.peak_t) - positive_part(self.G_II - self.G_I))
+        along = positive_part(larger * _shape(x, self.alpha, self.peak_n) - positive_part(self.G_I - self.G_II))
+        k_n = _secant(x, self.alpha, self.peak_n) / normal**2 * across
+        k_t = _secant(y, self.beta, self.peak_t) / tangential**2 * along
+        return k_n, k_t
+
+    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
+        """Loss of strength in each pure mode after its peak (thesis 4.26, 4.27)."""
+        normal, tangential = self.final
+        y = kappa / (ufl.sqrt(self.G_II / self.G_I) * tangential)
+        return _damage(kappa / normal, self.alpha, self.peak_n), _damage(y, self.beta, self.peak_t)
+
+
+def _exponent(shape: Expr, peak: Expr) -> Expr:
+    """Exponent m that places the peak."""
+    return shape * (shape - 1) * peak**2 / (1 - shape * peak**2)
+
+
+def _shape(x: Expr, shape: Expr, peak: Expr) -> Expr:
+    """Potential f of one mode over its toughness, from 1 to 0."""
+    m = _exponent(shape, peak)
+    return ufl.conditional(ufl.lt(x, 1), (1 - x) ** shape * (1 + shape * x / m) ** m, 0.0)
+
+
+def _slope(x: Expr, shape: Expr, peak: Expr) -> Expr:
+    """−f' before the final opening."""
+    m = _exponent(shape, peak)
+    return shape * (shape / m + 1) * x * (1 - x) ** (shape - 1) * (1 + shape * x / m) ** (m - 1)
+
+
+def _secant(x: Expr, shape: Expr, peak: Expr) -> Expr:
+    """−f'/x, zero from the final opening on."""
+    m = _exponent(shape, peak)
+    secant = shape * (shape / m + 1) * (1 - x) ** (shape - 1) * (1 + shape * x / m) ** (m - 1)
+    return ufl.conditional(ufl.lt(x, 1), secant, 0.0)
+
+
+def _damage(x: Expr, shape: Expr, peak: Expr) -> Expr:
+    """1 − f'/f'(peak) after the peak."""
+    lost = 1 - x * _secant(x, shape, peak) / _slope(peak, shape, peak)
+    return ufl.conditional(ufl.gt(x, peak), lost, 0.0)
