@@ -86,6 +86,7 @@ class Mechanics:
             symmetric=all(t.symmetric for t in terms),
             inertia=self.inertia is not None,
             terms=[t for t in terms if t.assembles],
+            multipliers=[m for t in terms for m in t.multipliers],
             interface_dofs=self._interface_nodes(interfaces) if interfaces else None,
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
@@ -97,8 +98,8 @@ class Mechanics:
 
     @property
     def fields(self) -> Mapping[str, Expr]:
-        """Fields beside the displacement for output, by name: the velocity of a dynamic analysis."""
-        return {} if self.inertia is None else {"velocity": self.inertia.velocity}
+        """Fields of the terms for output, by name, such as the velocity of a dynamic analysis."""
+        return {name: field for t in self.terms for name, field in t.fields.items()}
 
     @property
     def corners(self) -> tuple[float, ...]:

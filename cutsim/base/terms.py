@@ -5,10 +5,12 @@ The object that owns a term writes it: its form, its moving constants, its histo
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import ufl
+from dolfinx import fem
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -20,6 +22,19 @@ ENTRIES = (
     "strain", "kinetic", "thermoelastic", "cohesive_stored", "contact",  # stored
     "fracture", "friction", "viscous", "numerical",  # lost
 )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Multiplier:
+    """A further unknown of a term and the equation that it adds.
+
+    Attributes:
+        value: The unknown. Scaled to a length, so that its equation is a force like those of the displacement.
+        equation: Derivative of the term's energy along a test function of the space of `value`.
+    """
+
+    value: fem.Function
+    equation: ufl.Form
 
 
 class Term:
@@ -42,6 +57,16 @@ class Term:
     @property
     def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
         """Maps from mesh entities to the cells of submeshes on which coefficients of the term live."""
+        return {}
+
+    @property
+    def multipliers(self) -> Sequence[Multiplier]:
+        """Unknowns of the term beside the displacement, with their equations."""
+        return ()
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """Fields of the term for output, by name."""
         return {}
 
     def prepare(self) -> None:

@@ -7,7 +7,7 @@ The scheme's balance at the end of a step, divided by 1 − α_f, is solved in t
 with u* = u₀ + Δt v₀ + (½ − β) Δt² a₀ and the history forces h = (α_f R₀ + α_m M a₀)/(1 − α_f), which are known.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -161,6 +161,11 @@ class Inertia(Term):
         return solution
 
     # -- steps ----------------------------------------------------------------------------------------------------
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """The velocity."""
+        return {"velocity": self.velocity}
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ c ρ a(u)·v of the inertia forces."""

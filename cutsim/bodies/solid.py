@@ -1,6 +1,7 @@
 """A deformable body: hyperelastic bulk, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
 
 import logging
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import basix
@@ -16,7 +17,8 @@ from cutsim.base.checks import require
 from cutsim.base.compat import expression, form
 from cutsim.base.kinematics import Expr, cofactor, deformation_gradient, green_lagrange
 from cutsim.base.parameters import with_constants
-from cutsim.base.terms import Term
+from cutsim.base.terms import Multiplier, Term
+from cutsim.bodies.pressure import PressureField
 from cutsim.bodies.volume_change import VolumeChange
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
@@ -41,8 +43,9 @@ class Solid(Term):
         plane: For two-dimensional meshes, plane strain or plane stress (unit thickness).
         volumetric: "full" or "reduced" integration of the volumetric part; by default reduced for ν ≥ 0.45.
             On simplices of degree 1 both coincide, and a warning says that the element locks. "mixed" projects the
-            volume change in each quadrilateral or hexahedron (docs/elements.md); with a material whose volumetric
-            part depends on det F only, and without thermal expansion.
+            volume change in each quadrilateral or hexahedron; with a material whose volumetric part depends on det F
+            only. "taylor-hood" adds a continuous pressure to the unknowns of a space of degree 2. Both without
+            thermal expansion (docs/elements.md).
         viscosity: Kelvin–Voigt viscosity η ≥ 0, S_v = η dE/dt [stress·time].
         relaxation: Prony series by which all but the volumetric part relaxes; the material is then the relaxed one.
             The strain energy in the audit is then with what the overstresses store.
@@ -65,7 +68,7 @@ class Solid(Term):
         *,
         name: str = "body",
         plane: Literal["strain", "stress"] = "strain",
-        volumetric: Literal["auto", "full", "reduced", "mixed"] = "auto",
+        volumetric: Literal["auto", "full", "reduced", "mixed", "taylor-hood"] = "auto",
         viscosity: float = 0.0,
         relaxation: Prony | None = None,
         density: float | None = None,
@@ -76,8 +79,8 @@ class Solid(Term):
         require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
         require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
         require("plane", plane, plane == "strain" or not state.axisymmetric, "'strain' in an axisymmetric problem")
-        kinds = ("auto", "full", "reduced", "mixed")
-        require("volumetric", volumetric, volumetric in kinds, "'auto', 'full', 'reduced' or 'mixed'")
+        kinds = ("auto", "full", "reduced", "mixed", "taylor-hood")
+        require("volumetric", volumetric, volumetric in kinds, f"one of {', '.join(kinds)}")
         require("viscosity", viscosity, viscosity >= 0, ">= 0")
         require("density", density, density is None or density > 0, "> 0")
         # there λ₃ would depend on the overstress
@@ -95,7 +98,9 @@ class Solid(Term):
         self.measures = self._choose_measures(volumetric)
         self.assembles = volumetric == "mixed"
         self._mixed = self._projected() if self.assembles else None
+        self._pressure = self._continuous() if volumetric == "taylor-hood" else None
         self._overstress = None if relaxation is None else self._relaxing(relaxation)
+        self._histories = [part for part in (self._pressure, self._overstress) if part is not None]
         self._energy_form = form(self._stored(state.u))
         self._viscous_form = form(self._viscous_work()) if viscosity else None
         self._viscous = self._viscous_old = 0.0
@@ -160,6 +165,20 @@ class Solid(Term):
             work += self._overstress.residual(v)
         return work
 
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """The pressure of Taylor–Hood elements, > 0 in tension [stress]."""
+        return {} if self._pressure is None else {f"{self.name}_pressure": self._pressure.shown}
+
+    @property
+    def multipliers(self) -> Sequence[Multiplier]:
+        """The pressure of Taylor–Hood elements."""
+        if self._pressure is None:
+            return ()
+        unknown = self._pressure.unknown
+        q = ufl.TestFunction(unknown.function_space)
+        return (Multiplier(unknown, ufl.derivative(self._stored(self.state.u), unknown, q)),)
+
     def prepare(self) -> None:
         """Project the volume change of mixed elements. Collective."""
         if self._mixed is not None:
@@ -223,14 +242,14 @@ class Solid(Term):
     def rollback(self) -> None:
         """Forget the energies of the step."""
         self._viscous, self._thermal = self._viscous_old, self._thermal_old
-        if self._overstress is not None:
-            self._overstress.rollback()
+        for part in self._histories:
+            part.rollback()
 
     def commit(self) -> None:
         """Adopt the energies, and the temperature at which the step was in equilibrium."""
         self._viscous_old, self._thermal_old = self._viscous, self._thermal
-        if self._overstress is not None:
-            self._overstress.commit()
+        for part in self._histories:
+            part.commit()
         if self.temperature is not None:
             self._temperature_seen.x.array[:] = self._temperature_trial
 
@@ -277,6 +296,8 @@ class Solid(Term):
 
     def _energy(self, F: Expr, T: Expr | None) -> tuple[Expr, Expr]:
         """Both parts of the strain energy per reference volume."""
+        if self._pressure is not None:
+            return self._law.energy(F)[0], self._pressure.energy(F)
         if self._thermoelastic is None:
             return self._law.energy(F)
         stretch, factor = self._thermoelastic.stretch(T), self._thermoelastic.shear_factor(T)
@@ -293,14 +314,23 @@ class Solid(Term):
         return self._law.energy(J ** (1 / 3) * ufl.Identity(3))[1]
 
     def _projected(self) -> VolumeChange:
+        self._check_mixed("mixed")
         cell = self.state.mesh.topology.cell_name()
         require("volumetric", "mixed", cell in ("quadrilateral", "hexahedron"), f"'reduced' on a {cell}")
-        require("volumetric", "mixed", self.plane == "strain", "'full' or 'reduced' in plane stress")
-        require("volumetric", "mixed", self.temperature is None, "'full' or 'reduced' with thermal expansion")
         kind = type(self.material).__name__
         require("volumetric", "mixed", _by_volume(self.material), f"'full' or 'reduced' for {kind}")
         J = ufl.det(self.deformation_gradient(self.state.u))
         return VolumeChange(self.state, J, self._volumetric, self.measures[0], self.cells)
+
+    def _continuous(self) -> PressureField:
+        self._check_mixed("taylor-hood")
+        degree = self.state.V.ufl_element().degree
+        require("volumetric", "taylor-hood", degree == 2, f"'mixed' or 'reduced' for degree {degree}")
+        return PressureField(self.state, self.material, self._law, self.cells)
+
+    def _check_mixed(self, volumetric: str) -> None:
+        require("volumetric", volumetric, self.plane == "strain", "'full' or 'reduced' in plane stress")
+        require("volumetric", volumetric, self.temperature is None, "'full' or 'reduced' with thermal expansion")
 
     def _stored(self, u: Expr, T: Expr | None = None) -> ufl.Form:
         shear, volumetric = self._parts(u, self._temperature() if T is None else T)

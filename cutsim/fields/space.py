@@ -57,16 +57,40 @@ def cracked_space(mesh: Mesh, element: Any, facets: Facets) -> fem.FunctionSpace
     _check_element(parent.ufl_element())
     incidence = _incidence(mesh, parent, cracked)
     dofs, owners = _split_dofs(parent, incidence, _copies(mesh.comm, incidence))
-    index_map, local_dofs = _renumber(mesh.comm, dofs, owners)
-    dofmap = cpp.fem.DofMap(
-        parent.dofmap.dof_layout,
-        index_map,
-        parent.dofmap.index_map_bs,
-        graph.adjacencylist(local_dofs),
-        parent.dofmap.bs,
-    )
-    space = type(parent._cpp_object)(mesh._cpp_object, parent.element, dofmap, parent.value_shape)
-    return fem.FunctionSpace(mesh, parent.ufl_element(), space)
+    return _with_dofs(parent, dofs, owners)
+
+
+def vertex_space(V: fem.FunctionSpace, cells: NDArray[np.int32] | None = None) -> fem.FunctionSpace:
+    """Scalar Lagrange space of degree 1 on one body, split across cracks as another space is. Collective.
+
+    Args:
+        V: Lagrange space of any degree, cracked or not, whose dofs in vertices are those of the new space.
+        cells: Local cells of the body, all by default. The space has no dofs elsewhere: values in other cells have
+            no meaning.
+
+    Returns:
+        The space on the mesh of V.
+    """
+    mesh, dofmap, index_map = V.mesh, V.dofmap, V.dofmap.index_map
+    comm, n = mesh.comm, index_map.size_local
+    parent = fem.functionspace(mesh, ("Lagrange", 1))
+    places = [dofmap.dof_layout.entity_dofs(0, i)[0] for i in range(parent.dofmap.dof_layout.num_dofs)]
+    cell_dofs = np.ascontiguousarray(dofmap.list[:, places])
+    owned = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
+    body = cell_dofs[owned if cells is None else np.intersect1d(cells, owned)]
+    used = np.zeros(n + index_map.num_ghosts, dtype=np.int32)
+    used[body] = 1
+    kept = np.flatnonzero(_sum_over_ranks(index_map, used)[:n])
+    counts = comm.allgather(kept.size)
+    number = la.vector(index_map, dtype=np.int64)
+    number.array[:] = -1
+    number.array[kept] = sum(counts[: comm.rank]) + np.arange(kept.size)
+    number.scatter_forward()
+    # a cell of another body has to point somewhere
+    owner = np.where(number.array < 0, np.argmax(counts), [*([comm.rank] * n), *index_map.owners])
+    start = sum(counts[: np.argmax(counts)])
+    number.array[number.array < 0] = start
+    return _with_dofs(parent, number.array[cell_dofs], owner[cell_dofs].astype(np.int32))
 
 
 def crack_measure_entities(mesh: Mesh, facets: Facets, plus: NDArray[np.int32] | Sequence[float]) -> NDArray[np.int32]:
@@ -331,6 +355,15 @@ def _split_dofs(
     owners[on_crack] = copies.owners[copy]
     dofs[on_crack] = kept_before[copies.owners[copy] + 1] + copy  # after the kept dofs of its owner
     return dofs, owners.astype(np.int32)
+
+
+def _with_dofs(parent: fem.FunctionSpace, dofs: NDArray[np.int64], owners: NDArray[np.int32]) -> fem.FunctionSpace:
+    """The space with other dofs: global number and owner of those of every local cell, each (cells, dofs of a cell)."""
+    mesh, old = parent.mesh, parent.dofmap
+    index_map, local = _renumber(mesh.comm, dofs, owners)
+    dofmap = cpp.fem.DofMap(old.dof_layout, index_map, old.index_map_bs, graph.adjacencylist(local), old.bs)
+    space = type(parent._cpp_object)(mesh._cpp_object, parent.element, dofmap, parent.value_shape)
+    return fem.FunctionSpace(mesh, parent.ufl_element(), space)
 
 
 def _renumber(comm: MPI.Comm, dofs: NDArray[np.int64], owners: NDArray[np.int32]) -> tuple[IndexMap, NDArray[np.int32]]:

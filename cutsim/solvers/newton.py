@@ -16,7 +16,8 @@ from petsc4py import PETSc
 from cutsim.base import compat
 from cutsim.base.checks import require
 from cutsim.base.options import Options
-from cutsim.base.terms import Term
+from cutsim.base.terms import Multiplier, Term
+from cutsim.solvers.multipliers import Multipliers
 from cutsim.solvers.preconditioners import LaggedPC, Preset, create_lagged, fallback_for, preset_for
 from cutsim.solvers.tangent import Tangent
 
@@ -91,6 +92,7 @@ class NonlinearProblem:
         symmetric: Whether the tangent is symmetric.
         inertia: Whether inertia balances forces, too: there may be supports without any reaction.
         terms: Terms with forces that are not in F: they assemble themselves.
+        multipliers: Further unknowns, on which F depends, with their equations.
         form_compiler_options: Options of FFCx.
         rtol: Tolerance relative to the force scale; PETSc option `snes_rtol`.
 
@@ -118,6 +120,7 @@ class NonlinearProblem:
         symmetric: bool = False,
         inertia: bool = False,
         terms: Sequence[Term] = (),
+        multipliers: Sequence[Multiplier] = (),
         form_compiler_options: Mapping[str, Any] | None = None,
         rtol: float = 1e-8,
     ) -> None:
@@ -134,6 +137,7 @@ class NonlinearProblem:
             for form in (F, J)
         )
         self._terms = tuple(terms)
+        self._multipliers = Multipliers(multipliers, u, bcs)
         self._create_vectors()
         self._tangent = Tangent(self._a, u.function_space, symmetric, terms)
         self._create_snes(rtol)
@@ -142,17 +146,22 @@ class NonlinearProblem:
         V = self.u.function_space
         layout = V.dofmap.index_map, V.dofmap.index_map_bs
         self._comm: MPI.Comm = V.mesh.comm
-        self._n_dofs = layout[0].size_global * layout[1]
         self._n = layout[0].size_local * layout[1]
         self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
-        # SNES iterates on a vector of its own: were it that of u, line searches would spoil their own start.
-        self._x = la.create_petsc_vector(*layout)
-        self._f, self._added = self._x.duplicate(), self._x.duplicate()
+        self._added = la.create_petsc_vector(*layout)
+        # SNES iterates on a vector of its own, displacement first, then multipliers: were it that of u, line searches
+        # would spoil their own start.
+        self._x = PETSc.Vec().createWithArray(self._unknowns(), comm=self._comm)
+        self._f = self._x.duplicate()
+        self._n_dofs = self._x.size
         self.known: NDArray[np.float64] = np.zeros(self._n)
         self.fixed = np.zeros(self._n, dtype=bool)
         for bc in self.bcs:
             dofs = bc.dof_indices()[0]
             self.fixed[dofs[dofs < self._n]] = True
+        # among all unknowns
+        self._held = np.flatnonzero(self.fixed)
+        self._free = np.setdiff1d(np.arange(self._x.local_size), self._held)
         self._previous_scale = 0.0
         cells = np.arange(V.mesh.topology.index_map(V.mesh.topology.dim).size_local, dtype=np.int32)
         h = np.max(V.mesh.h(V.mesh.topology.dim, cells), initial=0.0)
@@ -162,7 +171,7 @@ class NonlinearProblem:
         self._snes = PETSc.SNES().create(self._comm)
         self._snes.setOptionsPrefix(self._options.prefix)
         self._snes.setFunction(self._evaluate_residual, self._f)
-        self._snes.setJacobian(self._evaluate_tangent, self._tangent.A)
+        self._set_matrix()
         self._snes.setConvergenceTest(self._test)
         self._snes.setLineSearchPreCheck(self._check_step)
         # stol = 0: a small step is no sign of equilibrium.
@@ -171,7 +180,10 @@ class NonlinearProblem:
         self._lagged: LaggedPC | None = None
         if "pc_type" not in self._options and "ksp_type" not in self._options:
             has_interface, gdim = self._interface_dofs is not None, self.u.function_space.mesh.geometry.dim
-            self._install(preset_for(self._n_dofs, self._symmetric, self._comm.size, has_interface, gdim))
+            saddle = self._n_dofs > self._tangent.A.size[0]
+            self._install(
+                preset_for(self._n_dofs, self._symmetric, self._comm.size, has_interface, gdim, saddle_point=saddle)
+            )
         self._snes.setFromOptions()
         self._rtol, _, _, self._max_it = self._snes.getTolerances()
 
@@ -232,7 +244,7 @@ class NonlinearProblem:
 
     def _iterate(self) -> tuple[int, int]:
         """Run SNES, again after each failure of the linear solver that a better preconditioner may cure."""
-        self._x.array[:] = self.u.x.array[: self._n]
+        self._x.array[:] = self._unknowns()
         for bc in self.bcs:
             bc.set(self._g.array, None, 1.0)
         self._residuals: list[float] = []
@@ -258,7 +270,7 @@ class NonlinearProblem:
         else:
             self._lagged.refresh(pattern=True)
         self._tangent.renew()
-        self._snes.setJacobian(self._evaluate_tangent, self._tangent.A)
+        self._set_matrix()
 
     def _better_preconditioner(self) -> bool:
         """After a failed linear solve: rebuild the preconditioner, or else factorise; False if neither is left."""
@@ -291,7 +303,7 @@ class NonlinearProblem:
             A new vector of the owned dofs; the caller owns it.
         """
         self._assemble_residual(lift=False)
-        b = self._x.duplicate()
+        b = self._added.duplicate()
         b.array[:] = self._r.array[: self._n]
         return b
 
@@ -305,9 +317,17 @@ class NonlinearProblem:
         b.array[~self.fixed] = 0.0
         return b
 
+    def _set_matrix(self) -> None:
+        A = self._multipliers.around(self._tangent.A, symmetric=self._symmetric)
+        self._snes.setJacobian(self._evaluate_tangent, A)
+
+    def _unknowns(self) -> NDArray[np.float64]:
+        return np.concatenate([self.u.x.array[: self._n], self._multipliers.values])
+
     def _assign(self, x: PETSc.Vec) -> None:
-        self.u.x.array[: self._n] = x.array_r
+        self.u.x.array[: self._n] = x.array_r[: self._n]
         self.u.x.scatter_forward()
+        self._multipliers.assign(x.array_r[self._n :])
 
     def _assemble_residual(self, *, lift: bool) -> None:
         for term in self._terms:
@@ -339,13 +359,13 @@ class NonlinearProblem:
         """Called by SNES: residual with lifting; u - g in the constrained rows."""
         self._assign(x)
         self._assemble_residual(lift=True)
-        b.array[:] = self._r.array[: self._n]
+        b.array[:] = np.concatenate([self._r.array[: self._n], self._multipliers.residual()])
         # While prescribed values do not hold, these rows carry lifting too; but then u is no solution either.
-        self._reaction = b.array_r[self.fixed]
-        b.array[self.fixed] = self._jump(x)
+        self._reaction = b.array_r[self._held]
+        b.array[self._held] = self._jump(x)
 
     def _jump(self, x: PETSc.Vec) -> NDArray[np.float64]:
-        return x.array_r[self.fixed] - self._g.array[: self._n][self.fixed]
+        return x.array_r[self._held] - self._g.array[self._held]
 
     def _evaluate_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Called by SNES."""
@@ -353,10 +373,11 @@ class NonlinearProblem:
         for term in self._terms:
             term.prepare()
         self._tangent.assemble(self.bcs)
+        self._multipliers.assemble()
 
     def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:
         """Called by SNES after the linear solve: make the step of the constrained dofs exact."""
-        y.array[self.fixed] = self._jump(x)
+        y.array[self._held] = self._jump(x)
         if self._lagged is not None:
             self._lagged.observe(self._snes.getKSP().getIterationNumber())
         return True
@@ -364,9 +385,9 @@ class NonlinearProblem:
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Called by SNES: reduce the local numbers, then judge."""
         f, x = snes.getFunction()[0].array_r, snes.getSolution().array_r
-        squares = [f[~self.fixed], self._reaction, self._tangent.diagonal[~self.fixed]]
+        squares = [f[self._free], self._reaction, self._tangent.diagonal[~self.fixed]]
         free, reaction, stiffness = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
-        jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self.fixed], x))
+        jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self._held], x))
         self._size = max(self._size, size)
         length = self._size + self._h
         reason = self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
@@ -389,7 +410,7 @@ class NonlinearProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects and remove the options of this problem."""
-        for thing in (self._snes, self._tangent, self._x, self._f, self._added):
+        for thing in (self._snes, self._multipliers, self._tangent, self._x, self._f, self._added):
             thing.destroy()
         self._options.clear()
 

@@ -22,7 +22,7 @@ class Preset:
     """A linear solver: a Krylov method, a preconditioner that is kept, and perhaps a strip along the crack.
 
     Attributes:
-        name: "direct", "bulk" or "crack".
+        name: "direct", "bulk", "crack" or "saddle".
         ksp: PETSc options of the Krylov method, without prefix.
         kept: PETSc options of the preconditioner kept by `LaggedPC`, without prefix.
         patience: Krylov iterations of one solve beyond which the kept preconditioner counts as stale.
@@ -36,7 +36,9 @@ class Preset:
     strip: Mapping[str, Any] = field(default_factory=dict)
 
 
-def preset_for(n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gdim: int) -> Preset:
+def preset_for(
+    n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gdim: int, *, saddle_point: bool = False
+) -> Preset:
     """Choose the linear solver by size, symmetry, ranks and presence of a crack.
 
     The Krylov method is always GMRES with the preconditioner on the right: it bears a tangent made indefinite by
@@ -49,11 +51,14 @@ def preset_for(n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gd
         ranks: Number of MPI ranks.
         has_interface: Whether there is a crack, whose stiffness may be very large or negative.
         gdim: Dimension of space; in the plane a factorisation stays cheap much longer.
+        saddle_point: Whether there are multipliers.
 
     Returns:
         The preset.
     """
-    if n_dofs <= (DIRECT_LIMIT_CRACK if has_interface else DIRECT_LIMIT)[gdim]:
+    limit = (DIRECT_LIMIT_CRACK if has_interface or saddle_point else DIRECT_LIMIT)[gdim]
+    # multipliers beside a stiff crack leave the strip along it no place in the cycle
+    if n_dofs <= (FALLBACK_LIMIT if has_interface and saddle_point else limit):
         return _direct(symmetric)
     # On several ranks SOR is a block method, which needs Chebyshev to bound it.
     smoother = "richardson" if ranks == 1 else "chebyshev"
@@ -63,6 +68,8 @@ def preset_for(n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gd
         "mg_levels_ksp_max_it": 1,
         "mg_levels_pc_type": "sor",
     }
+    if saddle_point:
+        return Preset("saddle", _gmres(1e-4, 200), _schur(amg), patience=60)
     if has_interface:
         return Preset("crack", _gmres(1e-4, 200), amg, patience=40, strip=_factor(symmetric))
     return Preset("bulk", _gmres(1e-4, 200), amg, patience=30)
@@ -88,6 +95,20 @@ def _direct(symmetric: bool) -> Preset:
 
 def _factor(symmetric: bool) -> dict[str, Any]:
     return {"pc_type": "cholesky" if symmetric else "lu", "pc_factor_mat_solver_type": "mumps"}
+
+
+def _schur(amg: Mapping[str, Any]) -> dict[str, Any]:
+    """Block elimination of the displacement: multigrid for it, the diagonal of its Schur complement for the rest."""
+    split = {
+        "pc_type": "fieldsplit",
+        "pc_fieldsplit_type": "schur",
+        "pc_fieldsplit_schur_fact_type": "upper",
+        "pc_fieldsplit_schur_precondition": "selfp",
+        "fieldsplit_0_ksp_type": "preonly",
+        "fieldsplit_1_ksp_type": "preonly",
+        "fieldsplit_1_pc_type": "jacobi",
+    }
+    return split | {f"fieldsplit_0_{name}": value for name, value in amg.items()}
 
 
 def _gmres(rtol: float, max_it: int) -> dict[str, Any]:
@@ -315,4 +336,6 @@ def _create_pc(prefix: str, A: PETSc.Mat, P: PETSc.Mat) -> PETSc.PC:
     pc.setOptionsPrefix(prefix)
     pc.setOperators(A, P)
     pc.setFromOptions()
+    if pc.getType() == PETSc.PC.Type.FIELDSPLIT:
+        pc.setFieldSplitIS(*zip("01", A.getNestISs()[0], strict=True))
     return pc
