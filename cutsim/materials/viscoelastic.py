@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from cutsim.base.checks import require
 from cutsim.base.compat import expression
 from cutsim.base.kinematics import Expr, green_lagrange
-from cutsim.materials.elastic.maxwell import Maxwell
-from cutsim.materials.elastic.spring import Spring
 from cutsim.fields.state import State
+from cutsim.materials.maxwell import Maxwell
+from cutsim.materials.spring import Spring
 
 Array = NDArray[np.float64]
 

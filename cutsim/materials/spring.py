@@ -1,0 +1,164 @@
+"""A strain energy by itself: energy, and strain that belongs to a stress, at given points (docs/materials.md)."""
+
+from collections.abc import Callable, Sequence
+
+import basix
+import basix.ufl
+import numpy as np
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from cutsim.base.compat import expression
+from cutsim.base.kinematics import Expr
+
+Array = NDArray[np.float64]
+
+_ITERATIONS = 30
+_HALVINGS = 12
+_TOLERANCE = 1e-11
+
+
+class Spring:
+    """A strain energy as a function of strain, and the strain that belongs to a stress, at the points of cells.
+
+    A strain is the vector of the components of E that are not zero, and behind them the pressure of the constraint on
+    the volume, which is zero unless the energy does not depend on the volume.  A stress is that of the work conjugates
+    ∂W/∂E, in which components off the diagonal count twice.  Arrays have the shape (cells, points, components).
+    Making it is collective.
+
+    Args:
+        mesh: The mesh.
+        energy: Strain energy per reference volume as a function of the deformation gradient.
+        pairs: Rows and columns of the components of strain, among them the three on the diagonal.
+        cells: Local cells.
+        degree: Degree of the quadrature rule.
+        scale: A stress by which to judge convergence, such as Young's modulus.
+
+    Attributes:
+        cells: The cells.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        energy: Callable[[Expr], Expr],
+        pairs: Sequence[tuple[int, int]],
+        cells: NDArray[np.int32],
+        degree: int,
+        scale: float,
+    ) -> None:
+        self._mesh, self.cells, self._tolerance = mesh, cells, _TOLERANCE * scale
+        self._order = {pair: k for k, pair in enumerate(pairs)}
+        kind = basix.CellType[mesh.topology.cell_name()]
+        points = basix.make_quadrature(kind, degree)[0]
+        element = basix.ufl.quadrature_element(kind.name, value_shape=(len(pairs) + 1,), degree=degree)
+        space = fem.functionspace(mesh, element)
+        self._dofs = space.dofmap.list[cells]
+        self._strain = fem.Function(space)
+        y = ufl.variable(self._strain)
+        C = self._right_cauchy_green(y)
+        W = energy(_cholesky(C))
+        self._energy = expression(W, points, mesh)
+        self._isochoric = self._ignores_volume()
+        unknowns = range(len(pairs) + self._isochoric)
+        slope = ufl.diff(W + 0.5 * y[len(pairs)] * ufl.ln(ufl.det(C)), y)
+        curvature = ufl.diff(slope, y)
+        entries = [slope[i] for i in unknowns] + [curvature[i, j] for i in unknowns for j in unknowns]
+        self._newton = expression(ufl.as_vector(entries), points, mesh)
+
+    @property
+    def undeformed(self) -> Array:
+        """Strain of the undeformed body."""
+        return np.zeros((*self._dofs.shape, len(self._order) + 1))
+
+    def energy(self, strain: Array) -> Array:
+        """Strain energy per reference volume, shape (cells, points)."""
+        return self._evaluate(self._energy, strain)[..., 0]
+
+    def reduced(self, components: Array) -> Array:
+        """Strain of the isochoric part of a deformation if the energy does not depend on the volume, else the same.
+
+        Args:
+            components: Components of E.
+        """
+        strain = self.undeformed
+        strain[..., :-1] = components
+        if self._isochoric:
+            C = np.zeros((*components.shape[:-1], 3, 3))
+            for (i, j), k in self._order.items():
+                C[..., i, j] = C[..., j, i] = (i == j) + 2 * components[..., k]
+            factor = 1 / np.cbrt(np.linalg.det(C))
+            for (i, j), k in self._order.items():
+                strain[..., k] = 0.5 * (factor * C[..., i, j] - (i == j))
+        return strain
+
+    def invert(self, stress: Array, start: Array) -> Array:
+        """Strain in equilibrium with a stress, by Newton's method at each point.
+
+        Args:
+            stress: The stress.
+            start: Strain to begin with.
+        """
+        y, (residual, curvature) = start, self._linearised(start, stress)
+        for _ in range(_ITERATIONS):
+            norm = np.linalg.norm(residual, axis=-1)
+            if (norm < self._tolerance).all():
+                break
+            step = np.zeros_like(y)
+            step[..., : residual.shape[-1]] = -np.linalg.solve(curvature, residual[..., None])[..., 0]
+            y, residual, curvature = self._searched(y, step, norm, stress)
+        return y
+
+    def _searched(self, y: Array, step: Array, norm: Array, stress: Array) -> tuple[Array, Array, Array]:
+        """Strain after a step that is halved wherever the residual does not fall."""
+        length = np.ones_like(norm)
+        for _ in range(_HALVINGS):
+            trial = y + length[..., None] * step
+            residual, curvature = self._linearised(trial, stress)
+            # what is not a number fails the comparison, too
+            worse = ~(np.linalg.norm(residual, axis=-1) < norm) & (norm > self._tolerance)
+            if not worse.any():
+                break
+            length[worse] *= 0.5
+        return trial, residual, curvature
+
+    def _linearised(self, y: Array, stress: Array) -> tuple[Array, Array]:
+        """Residual and its derivative at each point."""
+        unknowns = len(self._order) + self._isochoric
+        residual, curvature = np.split(self._evaluate(self._newton, y), [unknowns], axis=-1)
+        residual[..., : len(self._order)] -= stress
+        return residual, curvature.reshape(*residual.shape, unknowns)
+
+    def _ignores_volume(self) -> bool:
+        """Whether growth leaves the energy of a stretched body as it is. Collective."""
+        stretched = np.zeros((*self._dofs.shape, len(self._order)))
+        for i, stretch in enumerate((1.3, 1.1, 0.9)):
+            stretched[..., self._order[i, i]] = 0.5 * (stretch**2 - 1)
+        self._isochoric = True
+        strain, W = self.undeformed, self.energy(self.reduced(stretched))
+        strain[..., :-1] = stretched
+        changes = bool(np.any(np.abs(self.energy(strain) - W) > 1e-9 * np.abs(W)))
+        return not self._mesh.comm.allreduce(changes, MPI.LOR)
+
+    def _evaluate(self, compiled: fem.Expression, y: Array) -> Array:
+        self._strain.x.array.reshape(-1, len(self._order) + 1)[self._dofs] = y
+        size = int(np.prod(compiled.ufl_expression.ufl_shape))
+        return np.array(compiled.eval(self._mesh, self.cells)).reshape(*self._dofs.shape, size)
+
+    def _right_cauchy_green(self, strain: Expr) -> Expr:
+        rows = [[self._order.get((min(i, j), max(i, j))) for j in range(3)] for i in range(3)]
+        E = ufl.as_matrix([[0 if k is None else strain[k] for k in row] for row in rows])
+        return ufl.Identity(3) + 2 * E
+
+
+def _cholesky(C: Expr) -> Expr:
+    """The upper triangular F for which FᵀF = C."""
+    a = ufl.sqrt(C[0, 0])
+    b, c = C[0, 1] / a, C[0, 2] / a
+    d = ufl.sqrt(C[1, 1] - b**2)
+    e = (C[1, 2] - b * c) / d
+    f = ufl.sqrt(C[2, 2] - c**2 - e**2)
+    return ufl.as_matrix([[a, b, c], [0, d, e], [0, 0, f]])
