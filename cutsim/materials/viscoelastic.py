@@ -95,7 +95,7 @@ class Overstress:
         self._pairs = [(i, j) for i in range(gdim) for j in range(i, gdim)] + [(2, 2)] * (gdim == 2)
         self._conjugate = np.array([1.0 if i == j else 2.0 for i, j in self._pairs])
         degree, name = measure.metadata()["quadrature_degree"], mesh.topology.cell_name()
-        points = basix.make_quadrature(basix.CellType[name], degree)[0]
+        points, self._weights = basix.make_quadrature(basix.CellType[name], degree)
         shapes = (len(self._pairs),), ()
         elements = (basix.ufl.quadrature_element(name, value_shape=shape, degree=degree) for shape in shapes)
         space, scalars = (fem.functionspace(mesh, element) for element in elements)
@@ -103,17 +103,22 @@ class Overstress:
         F = state.deformation_gradient(state.u)
         entries = [tensor[i, j] for tensor in (self._stress(F), green_lagrange(F)) for i, j in self._pairs]
         self._response = expression(ufl.as_vector(entries), points, mesh)
-        # in a step the overstress is known + weight × stress
-        self._known = fem.Function(space)
-        self._weight = fem.Constant(mesh, default_scalar_type(0.0))
-        self._before: tuple[float, Array] = (0.0, self._known.x.array.copy())
         strain, self._S = self._evaluate()
-        self._h: Array = np.zeros((len(prony.times), *self._S.shape))
-        self._S_old, self._h_old = self._S, self._h
-        self._decay: Array = np.ones(len(prony.times))
-        self._gain: Array = np.zeros(len(prony.times))
+        self._remember(space)
         spring = Spring(mesh, energy, self._pairs, self._cells, degree, scale)
         self.energies = Maxwell(spring, np.array(prony.strengths), fem.Function(scalars), measure, strain)
+
+    def _remember(self, space: fem.FunctionSpace) -> None:
+        """Histories of a body at rest. In a step the overstress is known + weight × stress."""
+        mesh, terms = space.mesh, len(self._prony.times)
+        self._known = fem.Function(space)
+        self._means = fem.Function(fem.functionspace(mesh, ("DG", 0, (len(self._pairs),))))
+        self._weight = fem.Constant(mesh, default_scalar_type(0.0))
+        self._before: tuple[float, Array] = (0.0, np.zeros_like(self._S))
+        self._h: Array = np.zeros((terms, *self._S.shape))
+        self._S_old, self._h_old = self._S, self._h
+        self._decay: Array = np.ones(terms)
+        self._gain: Array = np.zeros(terms)
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of the overstresses."""
@@ -123,16 +128,18 @@ class Overstress:
         return changing + ufl.inner(F * self._tensor(self._known), ufl.derivative(F, u, v)) * self._dx
 
     def piola(self, F: Expr) -> Expr:
-        """First Piola–Kirchhoff stress of the overstresses at the end of the step, 3 × 3 [stress]."""
-        return F * (self._weight * self._stress(F) + self._tensor(self._known))
+        """First Piola–Kirchhoff stress of the overstresses at the end of the step, 3 × 3 [stress].
+
+        What is left of earlier steps is known at the integration points, and enters by its mean over each cell.
+        """
+        return F * (self._weight * self._stress(F) + self._tensor(self._means))
 
     def begin(self) -> None:
         """Factors of the step whose size the state knows."""
-        self._before = float(self._weight.value), self._known.x.array.copy()
+        self._before = float(self._weight.value), self._known.x.array.reshape(-1, len(self._pairs))[self._dofs]
         self._decay, self._gain = self._prony.factors(float(self._state.dt.value))
         self._weight.value = self._gain.sum()
-        known = np.tensordot(self._decay, self._h_old, 1) - self._gain.sum() * self._S_old
-        self._known.x.array.reshape(-1, len(self._pairs))[self._dofs] = known
+        self._know(np.tensordot(self._decay, self._h_old, 1) - self._gain.sum() * self._S_old)
 
     def evaluate(self) -> None:
         """Overstresses at the end of the step, and their energies. Collective."""
@@ -145,7 +152,8 @@ class Overstress:
 
     def rollback(self) -> None:
         """Forget the step."""
-        self._weight.value, self._known.x.array[:] = self._before
+        self._weight.value, known = self._before
+        self._know(known)
         self._S, self._h = self._S_old, self._h_old
         self.energies.rollback()
 
@@ -153,6 +161,13 @@ class Overstress:
         """Adopt the overstresses of the step."""
         self._S_old, self._h_old = self._S, self._h
         self.energies.commit()
+
+    def _know(self, values: Array) -> None:
+        self._known.x.array.reshape(-1, len(self._pairs))[self._dofs] = values
+        means = np.tensordot(values, self._weights / self._weights.sum(), ([1], [0]))
+        self._means.x.array.reshape(-1, len(self._pairs))[self._means.function_space.dofmap.list[self._cells, 0]] = (
+            means
+        )
 
     def _evaluate(self) -> tuple[Array, Array]:
         """Strain and stress at the integration points, shape (cells, points, components) each."""
