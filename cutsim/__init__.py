@@ -32,7 +32,8 @@ from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.pairs.surface_pair import SurfacePair
-from cutsim.tools.shapes import Ball, Blade, FlatPunch, Needle, Path, Plane
+from cutsim.tools.pointed import Blade, Needle
+from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation

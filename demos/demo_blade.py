@@ -41,7 +41,8 @@ from cutsim.results.output import interpolate, write_summary
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
-from cutsim.studies.cutting import BladeCut, ThermalCut, recovered_toughness
+from cutsim.studies.insertion import Insertion, ThermalCut
+from cutsim.studies.insertion_work import recovered_toughness
 
 MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
 
@@ -142,7 +143,7 @@ def push(
     dim = domain.mesh.geometry.dim
     law = Exponential.from_parameters(strength=strength, toughness=setting.toughness)
     forward, lateral = (0.0, -1.0, 0.0)[:dim], (1.0, 0.0, 0.0)[:dim]
-    cut = BladeCut.build(
+    cut = Insertion.build(
         domain,
         NeoHookean(young, poisson),
         law,
@@ -176,7 +177,7 @@ def push(
 # ## What came out
 
 
-def summarise(cut: BladeCut, history: History, law: Exponential, seconds: float) -> Summary:
+def summarise(cut: Insertion, history: History, law: Exponential, seconds: float) -> Summary:
     """Headline numbers of a run."""
     dim = cut.state.mesh.geometry.dim
     depth, force = history["depth"], history["force"]
@@ -209,7 +210,7 @@ def summarise(cut: BladeCut, history: History, law: Exponential, seconds: float)
     return summary
 
 
-def draw(cut: BladeCut, history: History, law: Exponential, out: Path, temperature: fem.Function | None) -> None:
+def draw(cut: Insertion, history: History, law: Exponential, out: Path, temperature: fem.Function | None) -> None:
     """Curves, energy audit and the cut body."""
     dim = cut.state.mesh.geometry.dim
     width = 1.0 if dim == 2 else WIDTH
@@ -240,7 +241,7 @@ def draw(cut: BladeCut, history: History, law: Exponential, out: Path, temperatu
     tip = np.where(np.arange(dim) == 1, tip, 0.0)
     edge = None if dim == 2 else (0.0, 0.0, WIDTH)
     start = tip if dim == 2 else tip - (0.0, 0.0, WIDTH / 2)
-    tool = prism(cut.blade.outline(max(HEIGHT, 1.0 - tip[1])), start, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), edge)
+    tool = prism(cut.tool.outline(max(HEIGHT, 1.0 - tip[1])), start, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), edge)
     labels = {"von Mises": ("cut", "von Mises stress [MPa]"), "heating": ("temperature", "temperature rise [K]")}
     for field in fields:
         name, label = labels[field]
@@ -256,7 +257,7 @@ def draw(cut: BladeCut, history: History, law: Exponential, out: Path, temperatu
         )
 
 
-def cut_height(cut: BladeCut) -> float:
+def cut_height(cut: Insertion) -> float:
     """Height of the block [mm]."""
     y = cut.state.mesh.geometry.x[:, 1]
     return -float(cut.state.mesh.comm.allreduce(float(y.min()), MPI.MIN))

@@ -35,7 +35,7 @@ from cutsim.identify import (
 from cutsim.materials.library import material
 from cutsim.results.output import write_summary
 from cutsim.results.plots import Curve, plot_curves
-from cutsim.studies.cutting import BladeCut
+from cutsim.studies.insertion import Insertion
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 COMM = MPI.COMM_WORLD
@@ -111,7 +111,7 @@ def cut(
     domain: TaggedMesh, specimen: Specimen, solid: NeoHookean, strength: float, values: dict[str, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Depth and force per width [N/mm] while the blade is pushed."""
-    problem = BladeCut.build(
+    problem = Insertion.build(
         domain,
         solid,
         Exponential.from_parameters(strength=strength, toughness=values["toughness"]),

@@ -10,7 +10,8 @@ from mpi4py import MPI
 from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
 from cutsim.base.compat import CACHE_DIR
 from cutsim.interface.cohesive import separation_curve
-from cutsim.studies.cutting import BladeCut, recovered_toughness
+from cutsim.studies.insertion import Insertion
+from cutsim.studies.insertion_work import recovered_toughness
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 TOUGHNESS = 0.2
@@ -22,7 +23,7 @@ def build(comm=MPI.COMM_WORLD, *, friction=0.0, viscosity=0.002, young=0.777, to
     blade = Blade(np.radians(12), block["lc"], 0.855)
     domain = read_geo(MESH, comm, block, gdim=2)
     material = NeoHookean(young, 0.45)
-    return BladeCut.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=viscosity)
+    return Insertion.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=viscosity)
 
 
 def push(cut, depth, control):
@@ -112,7 +113,7 @@ def test_parameters_are_refused_by_name():
     blade = Blade(0.2, 0.05, 0.855)
     for wrong in ({"notch": 0.01}, {"notch": 0.5, "friction": -0.1}, {"notch": 0.5, "insertion": 0.0}):
         with pytest.raises(ValueError, match=f"{list(wrong)[-1]} = "):
-            BladeCut.build(domain, NeoHookean(0.777, 0.45), law, blade, **wrong)
+            Insertion.build(domain, NeoHookean(0.777, 0.45), law, blade, **wrong)
     cut = build(lc=0.25, H=3.0)
     with pytest.raises(ValueError, match=r"depth = 0\.1"):
         cut.time_of(0.1)

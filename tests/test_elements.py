@@ -32,7 +32,8 @@ from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHook
 from cutsim.materials.rubbers import MooneyRivlin
 from cutsim.materials.viscoelastic import Prony
 from cutsim.studies.fracture import JIntegral
-from cutsim.tools.shapes import Ball, Needle, Path
+from cutsim.tools.pointed import Needle
+from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
 
 E = 2.0

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from cutsim import Blade, Exponential, NeoHookean, StepControl, StepError, read_geo, run
 from cutsim.identify import fit_simulation
 from cutsim.identify.inverse import Evaluations
-from cutsim.studies.cutting import BladeCut
+from cutsim.studies.insertion import Insertion
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 TRUE = {"stiffness": 2.0, "decay": 0.5}
@@ -132,7 +132,7 @@ def block():
 def blade_cut(values):
     """Force per width against depth."""
     law = Exponential.from_parameters(strength=0.4, toughness=values["toughness"])
-    cut = BladeCut.build(
+    cut = Insertion.build(
         block(),
         NeoHookean(0.777, 0.45),
         law,

@@ -16,7 +16,8 @@ from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb, SmoothCoulomb
 from cutsim.materials.elastic import LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.rubbers import MooneyRivlin
-from cutsim.tools.shapes import Ball, Blade, FlatPunch, Needle, Path, Plane
+from cutsim.tools.pointed import Blade, Needle
+from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
 from cutsim.tools.tool_contact import ToolContact
 
 STEPS = np.array([1e-2, 5e-3, 2.5e-3])

@@ -15,7 +15,8 @@ from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
-from cutsim.tools.shapes import Ball, Blade, Path, Plane
+from cutsim.tools.pointed import Blade
+from cutsim.tools.shapes import Ball, Path, Plane
 from cutsim.tools.tool_contact import ToolContact, warn_coarse
 
 CONTACT = PenaltyContact(60.0, blend=0.01)

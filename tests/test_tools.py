@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import ufl
 
-from cutsim.tools.shapes import Ball, Blade, FlatPunch, Needle, Path, Plane
+from cutsim.tools.pointed import Blade, Needle
+from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
 
 HALF, R, SHANK = 0.4, 0.3, 0.9  # half angle, tip radius, half thickness of the blade
 BLADE = Blade(HALF, R, SHANK)

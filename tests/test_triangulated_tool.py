@@ -19,7 +19,8 @@ from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import NeoHookean
-from cutsim.tools.shapes import Ball, Blade, Path
+from cutsim.tools.pointed import Blade
+from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation

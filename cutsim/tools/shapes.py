@@ -7,7 +7,7 @@ single formula gives tip, flank and shank without a kink.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import cos, pi, sin, tan
+from math import pi
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -32,171 +32,28 @@ class Shape(Protocol):
         """Signed distance at a position relative to the reference point [length], negative inside."""
 
 
-def _unit(name: str, vector: Direction) -> Direction:
+def unit(name: str, vector: Direction) -> Direction:
+    """Unit vector along one that the user gave under a name."""
     norm = float(np.linalg.norm(vector))
     require(name, vector, len(vector) in (2, 3) and norm > 0, "a non-zero vector of 2 or 3 numbers")
     return tuple(float(v) / norm for v in vector)
 
 
-def _along(x: Expr, direction: Direction) -> Expr:
+def along(x: Expr, direction: Direction) -> Expr:
+    """Component along a unit vector."""
     return ufl.dot(x, ufl.as_vector(direction))
 
 
-def _hypot(a: Expr, b: Expr, scale: float) -> Expr:
+def hypot(a: Expr, b: Expr, scale: float) -> Expr:
+    """Length √(a² + b²), differentiable where it vanishes."""
     # the floor keeps the gradient finite at the core's corner, a tip radius away from any contact
     return ufl.sqrt(a**2 + b**2 + (1e-8 * scale) ** 2)
 
 
-def _pointed(across: Expr, above: Expr, half_angle: float, width: float, radius: float) -> Expr:
-    """Distance to a pointed body with a rounded tip and joint, in the plane of its axis.
-
-    Args:
-        across: Distance from the axis, or < 0 where the body goes on without end.
-        above: Height above the tip of the core, in the body.
-        half_angle: Angle between axis and flank.
-        width: Half width of the shank of the core, a convex polygon.
-        radius: Radius of tip and joint, by which the body is larger than its core.
-    """
-    height = width / tan(half_angle)
-    s, c = sin(half_angle), cos(half_angle)
-    along = across * s + above * c
-    length = (width**2 + height**2) ** 0.5
-    tip = ufl.conditional(ufl.lt(across, 0), -above, _hypot(across, above, radius))
-    flank = across * c - above * s
-    joint = _hypot(across - width, above - height, radius)
-    shank = ufl.conditional(ufl.gt(above, height), across - width, joint)
-    return ufl.conditional(ufl.lt(along, 0), tip, ufl.conditional(ufl.lt(along, length), flank, shank)) - radius
-
-
-def _from_axis(x: Expr, push: Direction, scale: float) -> Expr:
+def from_axis(x: Expr, push: Direction, scale: float) -> Expr:
     """Distance from the axis along push, differentiable on it."""
-    radial = x - _along(x, push) * ufl.as_vector(push)
+    radial = x - along(x, push) * ufl.as_vector(push)
     return ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * scale) ** 2)
-
-
-@dataclass(frozen=True)
-class Blade:
-    """Wedge blade: rounded tip, flank at the half angle, parallel shank; its edge extends without end.
-
-    With `side` = ±1 it is the *convex half blade* that one crack face meets: the half on the side of ±lateral,
-    continued without end to the other side, so that no face is ever pushed to the wrong side.
-
-    Args:
-        half_angle: Angle between flank and plane of symmetry [rad], in (0, π/2).
-        tip_radius: Radius r > 0 of the tip and of the joint of flank and shank [length].
-        half_thickness: Half the thickness of the shank, > r [length].
-        push: Direction in which the blade cuts; the reference point is the foremost point of the tip.
-        lateral: Direction normal to the plane of symmetry.
-        side: 0 for the whole blade, +1 or −1 for the half on the side of ±lateral.
-
-    Raises:
-        ValueError: A value is outside its range, or push and lateral are not orthogonal.
-    """
-
-    half_angle: float
-    tip_radius: float
-    half_thickness: float
-    push: Direction = (0.0, -1.0)
-    lateral: Direction = (1.0, 0.0)
-    side: int = 0
-
-    def __post_init__(self) -> None:
-        require("half_angle", self.half_angle, 0 < self.half_angle < pi / 2, "in (0, pi/2) rad")
-        require("tip_radius", self.tip_radius, self.tip_radius > 0, "> 0")
-        require(
-            "half_thickness",
-            self.half_thickness,
-            self.half_thickness > self.tip_radius,
-            f"> tip_radius = {self.tip_radius}",
-        )
-        require("side", self.side, self.side in (-1, 0, 1), "-1, 0 or 1")
-        object.__setattr__(self, "push", _unit("push", self.push))
-        object.__setattr__(self, "lateral", _unit("lateral", self.lateral))
-        inner = float(np.dot(self.push, self.lateral))
-        require("lateral", self.lateral, abs(inner) < 1e-12, "orthogonal to push")
-
-    @property
-    def resolution(self) -> float:
-        """Tip radius [length]."""
-        return self.tip_radius
-
-    @property
-    def flank_height(self) -> float:
-        """Distance along the blade from the tip's centre to the beginning of the shank [length]."""
-        return (self.half_thickness - self.tip_radius) / tan(self.half_angle)
-
-    def half_width(self, height: float) -> float:
-        """Lateral distance from the plane of symmetry to the flank or shank, a height above the tip [length]."""
-        flank = ((height - self.tip_radius) * sin(self.half_angle) + self.tip_radius) / cos(self.half_angle)
-        return min(flank, self.half_thickness)
-
-    def outline(self, height: float, points: int = 12) -> NDArray[np.float64]:
-        """Cross-section of the whole blade up to a height above the tip, for pictures.
-
-        Args:
-            height: Height above the tip [length].
-            points: Points on the arc of the tip, on each side.
-
-        Returns:
-            Closed polygon without repeated point, rows (lateral, above the tip) [length].
-        """
-        turn = np.linspace(0, pi / 2 - self.half_angle, points)
-        arc = self.tip_radius * np.column_stack([np.sin(turn), 1 - np.cos(turn)])
-        flank = self.flank_height + self.tip_radius
-        rest = [(self.half_width(h), h) for h in sorted({min(flank, height), height})]
-        right = np.vstack([arc, rest])
-        return np.vstack([right, (right * (-1, 1))[:0:-1]])
-
-    def distance(self, x: Expr) -> Expr:
-        """Distance to the sharp core (a convex polygon) minus the tip radius [length]."""
-        across = _along(x, self.lateral)
-        across = abs(across) if self.side == 0 else self.side * across
-        above = -_along(x, self.push) - self.tip_radius  # from the core's tip into the blade
-        return _pointed(across, above, self.half_angle, self.half_thickness - self.tip_radius, self.tip_radius)
-
-
-@dataclass(frozen=True)
-class Needle:
-    """Round needle: cone with a rounded tip, cylindrical shaft; for 3-D and bodies of revolution.
-
-    In a plane problem it is a wedge blade.
-
-    Args:
-        half_angle: Angle between axis and cone [rad], in (0, π/2).
-        tip_radius: Radius r > 0 of the tip and of the joint of cone and shaft [length].
-        radius: Radius of the shaft, > r [length].
-        push: Direction in which the needle points; the reference point is the foremost point of the tip.
-
-    Raises:
-        ValueError: A value is outside its range.
-    """
-
-    half_angle: float
-    tip_radius: float
-    radius: float
-    push: Direction = (0.0, -1.0)
-
-    def __post_init__(self) -> None:
-        require("half_angle", self.half_angle, 0 < self.half_angle < pi / 2, "in (0, pi/2) rad")
-        require("tip_radius", self.tip_radius, self.tip_radius > 0, "> 0")
-        require("radius", self.radius, self.radius > self.tip_radius, f"> tip_radius = {self.tip_radius}")
-        object.__setattr__(self, "push", _unit("push", self.push))
-
-    @property
-    def resolution(self) -> float:
-        """Tip radius [length]."""
-        return self.tip_radius
-
-    @property
-    def shaft_height(self) -> float:
-        """Height above the foremost point at which the shaft begins [length]."""
-        return (self.radius - self.tip_radius) / tan(self.half_angle) + self.tip_radius
-
-    def distance(self, x: Expr) -> Expr:
-        """Distance to the sharp core (a cone with a cylinder) minus the tip radius [length]."""
-        across = _from_axis(x, self.push, self.tip_radius)
-        above = -_along(x, self.push) - self.tip_radius
-        return _pointed(across, above, self.half_angle, self.radius - self.tip_radius, self.tip_radius)
 
 
 @dataclass(frozen=True)
@@ -217,7 +74,7 @@ class Ball:
     def __post_init__(self) -> None:
         require("radius", self.radius, self.radius > 0, "> 0")
         if self.axis is not None:
-            object.__setattr__(self, "axis", _unit("axis", self.axis))
+            object.__setattr__(self, "axis", unit("axis", self.axis))
 
     @property
     def resolution(self) -> float:
@@ -226,7 +83,7 @@ class Ball:
 
     def distance(self, x: Expr) -> Expr:
         """Distance from the centre (or axis) minus the radius [length]."""
-        radial = x if self.axis is None else x - _along(x, self.axis) * ufl.as_vector(self.axis)
+        radial = x if self.axis is None else x - along(x, self.axis) * ufl.as_vector(self.axis)
         return ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * self.radius) ** 2) - self.radius
 
 
@@ -250,7 +107,7 @@ class FlatPunch:
     def __post_init__(self) -> None:
         require("edge_radius", self.edge_radius, self.edge_radius > 0, "> 0")
         require("radius", self.radius, self.radius > self.edge_radius, f"> edge_radius = {self.edge_radius}")
-        object.__setattr__(self, "push", _unit("push", self.push))
+        object.__setattr__(self, "push", unit("push", self.push))
 
     @property
     def resolution(self) -> float:
@@ -260,9 +117,9 @@ class FlatPunch:
     def distance(self, x: Expr) -> Expr:
         """Distance to the core, a flat disc with a straight shank, minus the edge radius [length]."""
         r = self.edge_radius
-        across = _from_axis(x, self.push, r) - (self.radius - r)
-        below = _along(x, self.push) + r
-        corner = _hypot(across, below, r)
+        across = from_axis(x, self.push, r) - (self.radius - r)
+        below = along(x, self.push) + r
+        corner = hypot(across, below, r)
         side = ufl.conditional(ufl.lt(below, 0), across, corner)
         face = ufl.conditional(ufl.lt(across, 0), below, corner)
         return ufl.conditional(ufl.gt(across, below), side, face) - r
@@ -282,7 +139,7 @@ class Plane:
     normal: Direction
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "normal", _unit("normal", self.normal))
+        object.__setattr__(self, "normal", unit("normal", self.normal))
 
     @property
     def resolution(self) -> float:
@@ -291,7 +148,7 @@ class Plane:
 
     def distance(self, x: Expr) -> Expr:
         """Distance along the normal [length]."""
-        return _along(x, self.normal)
+        return along(x, self.normal)
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,8 @@ class Patch:
 
     Attributes:
         surface: The surface.
+        place: Position of its points relative to the tool [length].
+        thrust: Traction of the contact pressure on the tool, −p ∇d [stress].
         slip: Memory of friction, None without friction.
     """
 
@@ -54,12 +56,13 @@ class Patch:
         temperature: fem.Function | None,
     ) -> None:
         self.surface = surface
-        place = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
-        x = ufl.variable(place)
-        self._normal = ufl.diff(shape.distance(x), x)
+        self.place = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
+        x = ufl.variable(self.place)
+        normal = ufl.diff(shape.distance(x), x)
         self._contact = with_constants(state.mesh, contact)
-        self._penetration = -shape.distance(place)
+        self._penetration = -shape.distance(self.place)
         self._pressure = self._contact.pressure(self._penetration)
+        self.thrust = -self._pressure * normal
         self.slip: SlipHistory | None = None
         if friction is not None:
             self.slip = SlipHistory(
@@ -68,16 +71,14 @@ class Patch:
                 friction,
                 surface.restrict(state.u) - position,
                 self._pressure,
-                project=lambda slip: tangential(slip, self._normal),
+                project=lambda slip: tangential(slip, normal),
                 temperature=None if temperature is None else surface.restrict(temperature),
             )
 
     def virtual_work(self, v: Expr) -> ufl.Form:
-        """Virtual work −∫ (p ∇d − t)·v of pressure and friction on the body."""
-        traction = self._pressure * self._normal
-        if self.slip is not None:
-            traction -= self.slip.traction
-        return -ufl.dot(traction, self.surface.restrict(v)) * self.surface.measure
+        """Virtual work ∫ (t − p ∇d)·v: pressure and friction as they act on the tool."""
+        traction = self.thrust if self.slip is None else self.thrust + self.slip.traction
+        return ufl.dot(traction, self.surface.restrict(v)) * self.surface.measure
 
     def energy(self) -> ufl.Form:
         """Energy of the contact penalty."""

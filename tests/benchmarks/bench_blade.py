@@ -11,7 +11,7 @@ from common import measure
 from mpi4py import MPI
 
 from cutsim import Blade, Exponential, NeoHookean, StepControl, StepReport, read_geo, run
-from cutsim.studies.cutting import BladeCut
+from cutsim.studies.insertion import Insertion
 
 MESH = Path(__file__).parents[2] / "meshes" / "block.geo"
 BLOCK = {"dim": 2, "Lx": 10.0, "H": 6.0, "lc": 0.05, "band": 0.4, "notch": 0.5}
@@ -24,7 +24,7 @@ def main() -> None:
         law = Exponential.from_parameters(strength=0.6, toughness=0.2)
         blade = Blade(np.radians(12), 0.05, 0.855)
         domain = read_geo(MESH, comm, BLOCK, gdim=2)
-        cut = BladeCut.build(domain, NeoHookean(0.777, 0.45), law, blade, notch=0.5, viscosity=0.002)
+        cut = Insertion.build(domain, NeoHookean(0.777, 0.45), law, blade, notch=0.5, viscosity=0.002)
     with measure(comm) as usage:
         run(cut.mechanics, cut.time_of(3.0), StepControl(first=0.02, largest=0.1), reports.append)
     force = cut.columns({})["force"][0]

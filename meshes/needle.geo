@@ -1,0 +1,67 @@
+// Half of a block that a needle splits, in front of the plane z = 0; the needle's axis is y. Lengths in mm, hexahedra.
+//
+//        top_left  | top_right   y = 0      y  the needle moves along -y
+//      +-----------:-----------+            |
+//      |           : notch     |            |          z  along the crack, away from the needle
+//      |   left    |   right   |            +---- x  opening of the crack
+//      |           | crack     |
+//      +-----------+-----------+  y = -H
+//     -L         bottom        L
+//
+// The plane x = 0 is the crack, but for the notch 0 < z < slit, -notch < y < 0. Faces "symmetry" (z = 0), "back" (z = B).
+// Sizes: lc down to `deep`, out to `band` and along z to `slit`, growing from there.
+Include "common.geo";
+DefineConstant[
+  L      = {12,  Name "L"},       // length of each half
+  B      = {10,  Name "B"},       // half the width
+  H      = {10,  Name "H"},       // height
+  notch  = {1,   Name "notch"},   // depth of the starting notch
+  slit   = {1.4, Name "slit"},    // half its width
+  deep   = {6,   Name "deep"},    // depth of the fine part
+  band   = {0.8, Name "band"},    // half width of the fine part
+  lc     = {0.2, Name "lc"},      // element size there
+  growth = {1.4, Name "growth"}   // ratio of neighbouring sizes outside
+];
+If (lc <= 0 || growth <= 1 || band <= 0 || band >= L || slit <= 0 || slit >= B)
+  Error("lc = %g must be > 0, growth = %g > 1, band = %g in (0, L = %g), slit = %g in (0, B = %g)", lc, growth, band, L, slit, B);
+EndIf
+If (notch <= 0 || notch >= deep || deep >= H)
+  Error("notch = %g must lie in (0, deep = %g), deep in (0, H = %g)", notch, deep, H);
+EndIf
+
+Point(1) = {0, -deep, 0};
+mouth[] = Extrude {0, deep - notch, 0} { Point{1}; Layers{Ceil((deep - notch) / lc - 1e-9)}; };
+rim[] = Extrude {0, notch, 0} { Point{mouth[0]}; Layers{Ceil(notch / lc - 1e-9)}; };
+size = growth * lc;
+length = H - deep;
+largest = H;
+Call Graded;
+foot[] = Extrude {0, -length, 0} { Point{1}; Layers{layers[], ends[]}; };
+
+length = L - band;
+Call Graded;
+For side In {-1:1:2}
+  out[] = Extrude {side * band, 0, 0} { Curve{mouth[1], rim[1], foot[1]}; Layers{Ceil(band / lc - 1e-9)}; Recombine; };
+  Extrude {side * length, 0, 0} { Curve{out[{0:#out[] - 1:4}]}; Layers{layers[], ends[]}; Recombine; }
+EndFor
+
+sections[] = Surface{:};
+near[] = Extrude {0, 0, slit} { Surface{sections[]}; Layers{Ceil(slit / lc - 1e-9)}; Recombine; };
+length = B - slit;
+Call Graded;
+Extrude {0, 0, length} { Surface{near[{0:#near[] - 1:6}]}; Layers{layers[], ends[]}; Recombine; }
+
+depth = B;
+dim = 3;
+e = 1e-6 * H;
+name = "left";      box[] = {-L, 0, -H, 0};  Call Cells;
+name = "right";     box[] = {0, L, -H, 0};   Call Cells;
+name = "top_left";  box[] = {-L, 0, 0, 0};   Call Facets;
+name = "top_right"; box[] = {0, L, 0, 0};    Call Facets;
+name = "bottom";    box[] = {-L, L, -H, -H}; Call Facets;
+name = "symmetry";                           Call Ends;
+notched[] = Surface In BoundingBox{-e, -notch - e, -e, e, e, slit + e};
+plane[] = Surface In BoundingBox{-e, -H - e, -e, e, e, B + e};
+plane[] -= notched[];
+Physical Surface("notch") = notched[];
+Physical Surface("crack") = plane[];
