@@ -33,7 +33,8 @@ from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHook
 from cutsim.materials.rubbers import MooneyRivlin, Ogden
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
-from cutsim.tools.shapes import Ball, Blade, Path
+from cutsim.tools.pointed import Blade
+from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
 
 E = 2.0
