@@ -6,6 +6,7 @@ from cutsim.analysis.stepping import StepControl, StepError, StepReport, run
 from cutsim.bodies.loads import Pressure, Support, Traction
 from cutsim.bodies.schemes import GeneralisedAlpha, Newmark
 from cutsim.bodies.solid import Solid
+from cutsim.fields.laminate import laminate
 from cutsim.fields.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
@@ -32,6 +33,7 @@ from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.studies.layered import Layer, LayeredBlock
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
 from cutsim.tools.tool_contact import ToolContact
@@ -65,6 +67,8 @@ __all__ = [
     "HeatTransfer",
     "InterfaceHeat",
     "IsochoricNeoHookean",
+    "Layer",
+    "LayeredBlock",
     "LinearElastic",
     "Material",
     "Mechanics",
@@ -104,6 +108,7 @@ __all__ = [
     "Triangulation",
     "Yeoh",
     "cracked_space",
+    "laminate",
     "piecewise_direction",
     "read_geo",
     "read_msh",

@@ -11,10 +11,12 @@ from types import MappingProxyType
 from cutsim.base.checks import require
 from cutsim.materials.elastic import IsochoricNeoHookean, Material, NeoHookean
 from cutsim.materials.fibres import DispersedFibres, Reinforced
-from cutsim.materials.rubbers import ArrudaBoyce, Ogden
+from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden
 
 #: Poisson's ratio given to solids that their source takes to be incompressible.
 INCOMPRESSIBLE = 0.495
+#: Poisson's ratio assumed for the epidermis.
+EPIDERMIS_POISSON = 0.48
 
 
 @dataclass(frozen=True)
@@ -50,13 +52,36 @@ def _silicone(young: float, poisson: float, strength: float) -> Record:
     return Record(NeoHookean(young, poisson), "thesis, table 5.1", strength)
 
 
+_TRAN = (
+    "Tran, Charleux, Rachik, Ehrlacher, Ho Ba Tho, Computer Methods in Biomechanics and Biomedical Engineering 10"
+    " (2007) 401: human forearm in vivo, indentation with magnetic resonance imaging"
+)
+
+
 def _skin(c10: float, bulk: float) -> Record:
-    """A layer of skin, W = C₁₀ (Ī₁−3) + volumetric part."""
+    """Skin in three layers, W = C₁₀ (Ī₁−3) + volumetric part."""
+    return Record(IsochoricNeoHookean.from_moduli(2 * c10, bulk), _TRAN)
+
+
+def _epidermis(young: float) -> Record:
+    """A layer of the epidermis."""
     source = (
-        "Tran, Charleux, Rachik, Ehrlacher, Ho Ba Tho, Computer Methods in Biomechanics and Biomedical Engineering 10"
-        " (2007) 401: human forearm in vivo, indentation with magnetic resonance imaging"
+        "Geerligs, van Breemen, Peters, Ackermans, Baaijens, Oomens, Journal of Biomechanics 44 (2011) 1176: 1 to 2 MPa"
+        " in indentation of stratum corneum and epidermis, without a difference between them; order within this range"
+        f" and nu = {EPIDERMIS_POISSON} assumed"
     )
-    return Record(IsochoricNeoHookean.from_moduli(2 * c10, bulk), source)
+    return Record(NeoHookean(young, EPIDERMIS_POISSON), source)
+
+
+def _dermis(fraction: float, added: str) -> Record:
+    """A layer of the dermis, one term of Ogden with a fraction of the modulus of the stiff one."""
+    # E = 3/2 μ is the initial slope of 1.18 MPa, and P = μ/m (λ^(m−1) − λ^(−m/2−1)) = 21.6 MPa at λ = 1.54
+    source = (
+        "Ni Annaidh, Bruyere, Destrade, Gilchrist, Ottenio, Journal of the Mechanical Behavior of Biomedical Materials"
+        " 5 (2012) 139: mean initial slope, strength and failure strain of human skin from the back in tension; one"
+        f" term through them{added}; nu = {INCOMPRESSIBLE} added"
+    )
+    return Record(Ogden.from_poisson((fraction * 1.18 / 1.5,), (14.93,), INCOMPRESSIBLE), source)
 
 
 def _bulk(shear: float) -> float:
@@ -102,7 +127,14 @@ LIBRARY: Mapping[str, Record] = MappingProxyType(
         "natural rubber, Arruda-Boyce": _EIGHT_CHAINS,
         "epidermis": _skin(0.12, 5.45),
         "dermis": _skin(1.11, 29.6),
-        "hypodermis": _skin(0.42e-3, 36.0e-3),
+        "stratum corneum": _epidermis(2.0),
+        "stratum lucidum": _epidermis(1.75),
+        "stratum granulosum": _epidermis(1.5),
+        "stratum spinosum": _epidermis(1.25),
+        "stratum basale": _epidermis(1.0),
+        "papillary dermis": _dermis(0.25, ", of which a quarter of the modulus is assumed"),
+        "reticular dermis": _dermis(1.0, ""),
+        "hypodermis": Record(MooneyRivlin(0.21e-3, 0.21e-3, 36.0e-3), f"{_TRAN}; C10 = 0.42 kPa in two equal parts"),
         "gelatin 1:2": _gelatin(0.277),
         "gelatin 1:20": _gelatin(4.34e-3),
         "iliac adventitia": _artery(
@@ -111,5 +143,21 @@ LIBRARY: Mapping[str, Record] = MappingProxyType(
         "carotid media": _artery(
             3.0e-3, 2.3632e-3, 0.8393, 29.0, 0.0, "Holzapfel, Gasser, Ogden, Journal of Elasticity 61 (2000) 1: rabbit"
         ),
+    }
+)
+
+#: Thickness of the layers of skin from the surface downwards [mm], for the records of the same names.  Epidermis 0.1
+#: and dermis 1 as in the thesis (section 2.3), a fifth of the dermis papillary as anatomy has it.  Assumed are the
+#: hypodermis and how the epidermis is shared (10 to 15 µm of stratum corneum are usual; only thick skin has a lucidum).
+SKIN: Mapping[str, float] = MappingProxyType(
+    {
+        "stratum corneum": 0.015,
+        "stratum lucidum": 0.010,
+        "stratum granulosum": 0.015,
+        "stratum spinosum": 0.050,
+        "stratum basale": 0.010,
+        "papillary dermis": 0.2,
+        "reticular dermis": 0.8,
+        "hypodermis": 0.9,
     }
 )

@@ -1,0 +1,133 @@
+"""Mesh of a block of flat layers with a crack plane through all of them: structured, graded, with named regions."""
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+from dolfinx.mesh import CellType, GhostMode, Mesh, create_box, create_rectangle
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.fields.meshing import Marker, TaggedMesh, tag_mesh
+
+Array = NDArray[np.float64]
+
+#: Sides of the block; names that no layer may have.
+SIDES = ("notch", "top_left", "top_right", "bottom", "far_left", "far_right", "front", "back")
+
+_GROWTH = 1.3  # ratio of neighbouring sizes beside the band
+
+
+def laminate(
+    comm: MPI.Comm,
+    layers: Mapping[str, float],
+    *,
+    length: float,
+    size: float,
+    band: float,
+    notch: float = 0.0,
+    least: int = 2,
+    width: float | None = None,
+    rows: int = 4,
+) -> TaggedMesh:
+    """Mesh a block of layers, quadrilaterals or hexahedra. Collective.
+
+    The top is y = 0, the layers follow each other downwards, and the plane of the crack is x = 0 (the frame of
+    meshes/block.geo).  Groups of cells are the layers; groups of facets are "crack_<layer>" for each layer that the
+    notch does not cut through, and `SIDES`, "front" and "back" in 3-D and "notch" with a notch only.
+
+    Args:
+        comm: Communicator over which the mesh is distributed.
+        layers: Name → thickness from the top downwards [length].
+        length: Length of each of the two halves [length].
+        size: Largest element along the crack plane and across it within the band [length].
+        band: Half width of the zone of uniform size about the crack plane, beside which elements grow [length].
+        notch: Depth of the notch from the top, less than that of the block [length].
+        least: Elements through a layer, at least; thin layers have no more.
+        width: Width along z of a block in 3-D, from z = 0 on; None for the plane [length].
+        rows: Elements across the width.
+
+    Raises:
+        ValueError: On all ranks, if a number is outside its range or a layer has no name of its own.
+    """
+    height = sum(layers.values())
+    require("layers", dict(layers), len(layers) > 0 and min(layers.values()) > 0, "at least one, of thickness > 0")
+    require("layers", list(layers), not set(layers) & set(SIDES), f"names other than {', '.join(SIDES)}")
+    require("size", size, size > 0, "> 0")
+    require("band", band, 0 < band <= length, f"> 0 and at most the length {length}")
+    require("notch", notch, 0 <= notch < height, f">= 0 and less than the height {height}")
+    require("least", least, least >= 1, ">= 1")
+    require("width", width, width is None or width > 0, "> 0 or None")
+    require("rows", rows, rows >= 1, ">= 1")
+    half = _graded(length, size, band)
+    bounds = -np.concatenate([[0.0], np.cumsum(list(layers.values()))])
+    lines = [np.concatenate([-half[:0:-1], half]), _down(bounds, size, notch, least)[::-1]]
+    if width is not None:
+        lines.append(np.linspace(0.0, width, rows + 1))
+    cells, facets = _markers(layers, bounds, length, notch, width)
+    return tag_mesh(_grid(comm, lines), cells, facets)
+
+
+def _graded(length: float, size: float, band: float) -> Array:
+    """Lines from the crack plane to the end of a half."""
+    inner = np.linspace(0.0, band, math.ceil(band / size - 1e-9) + 1)
+    rest = length - band
+    # the sum of a geometric series reaches the rest
+    n = math.ceil(math.log1p(rest / size * (_GROWTH - 1) / _GROWTH) / math.log(_GROWTH) - 1e-9)
+    outer = np.cumsum(_GROWTH ** np.arange(n))
+    return np.append(inner, band + rest * outer / outer[-1:])
+
+
+def _down(bounds: Array, size: float, notch: float, least: int) -> Array:
+    """Lines from the top to the bottom, among them the bounds of the layers and the end of the notch."""
+    lines = [bounds[:1]]
+    for top, bottom in pairwise(bounds):
+        stops = [top, -notch, bottom] if bottom < -notch < top else [top, bottom]
+        for a, b in pairwise(stops):
+            n = math.ceil((a - b) / min(size, (top - bottom) / least) - 1e-9)
+            lines.append(np.linspace(a, b, n + 1)[1:])
+    return np.concatenate(lines)
+
+
+def _grid(comm: MPI.Comm, lines: list[Array]) -> Mesh:
+    """Mesh of all cells between lines along each coordinate."""
+    counts, corners = [len(line) - 1 for line in lines], ([0.0] * len(lines), [len(line) - 1.0 for line in lines])
+    if len(lines) == 2:
+        mesh = create_rectangle(comm, corners, counts, CellType.quadrilateral, ghost_mode=GhostMode.shared_facet)
+    else:
+        mesh = create_box(comm, corners, counts, CellType.hexahedron, ghost_mode=GhostMode.shared_facet)
+    for i, line in enumerate(lines):
+        mesh.geometry.x[:, i] = line[np.rint(mesh.geometry.x[:, i]).astype(int)]
+    return mesh
+
+
+def _markers(
+    layers: Mapping[str, float], bounds: Array, length: float, notch: float, width: float | None
+) -> tuple[dict[str, Marker], dict[str, Marker]]:
+    """Markers of the groups of cells and of facets."""
+    bottom = bounds[-1]
+    slack = 1e-9 * max(length, -bottom)
+
+    def between(axis: int, low: float, high: float) -> Marker:
+        return lambda x: (x[axis] > low - slack) & (x[axis] < high + slack)
+
+    def both(first: Marker, second: Marker) -> Marker:
+        return lambda x: first(x) & second(x)
+
+    middle = between(0, 0.0, 0.0)
+    cells, facets = {}, {}
+    for name, (top, low) in zip(layers, pairwise(bounds), strict=True):
+        cells[name] = between(1, low, top)
+        if low < -notch - slack:
+            facets[f"crack_{name}"] = both(middle, between(1, low, min(top, -notch)))
+    if notch:
+        facets["notch"] = both(middle, between(1, -notch, 0.0))
+    facets["top_left"] = both(between(1, 0.0, 0.0), between(0, -length, 0.0))
+    facets["top_right"] = both(between(1, 0.0, 0.0), between(0, 0.0, length))
+    facets["bottom"] = between(1, bottom, bottom)
+    facets["far_left"], facets["far_right"] = between(0, -length, -length), between(0, length, length)
+    if width is not None:
+        facets["front"], facets["back"] = between(2, 0.0, 0.0), between(2, width, width)
+    return cells, facets
