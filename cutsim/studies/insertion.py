@@ -37,10 +37,11 @@ from cutsim.tools.tool_parts import PARTS, ToolParts
 # measured on blade cuts: stiff enough for the force, soft enough for Newton's method (pressure per length over E)
 _PENALTY = 5.0
 _BLEND = 0.4
-_TIP_IN_NOTCH = 0.8
 _ENDLESS = 1e3
-# face of the crack, side of the tool, name
-_FACES: tuple[tuple[Literal["+", "-"], int, str], ...] = (("+", 1, "right"), ("-", -1, "left"))
+#: Depth of the tip, as a part of the depth of the notch, when the push begins.
+TIP_IN_NOTCH = 0.8
+#: Face of the crack, side of the tool that it meets, name.
+FACES: tuple[tuple[Literal["+", "-"], int, str], ...] = (("+", 1, "right"), ("-", -1, "left"))
 
 
 @dataclass(frozen=True)
@@ -138,7 +139,7 @@ class Insertion:
         Raises:
             ValueError: A parameter is outside its range or the mesh lacks a group.
         """
-        tip = _TIP_IN_NOTCH * notch
+        tip = TIP_IN_NOTCH * notch
         require("notch", notch, notch > tool.tip_radius, f"> the tool's tip radius {tool.tip_radius}")
         require("friction", friction, friction >= 0, ">= 0")
         require("insertion", insertion, insertion > 0, "> 0")
@@ -150,21 +151,21 @@ class Insertion:
         crack = Crack(state, domain.facets("crack"), plus, law, young=material.young)
         mouth = Crack(state, domain.facets("notch"), plus, None, young=material.young, name="notch")
         warn_coarse(kind, tool, crack.size)
-        contact = PenaltyContact.automatic(material.young, crack.normal_size, _PENALTY, blend=_BLEND * tool.tip_radius)
+        contact = soft_contact(tool, crack, material.young)
 
         def half(face: Literal["+", "-"], side: int, name: str) -> ToolContact:
             side = 0 if revolved else side
             return ToolContact(
                 state,
                 replace(tool, side=side),
-                _path(tool, side, (tip, insertion, turn), mesh.geometry.dim),
+                tool_path(tool, side, (tip, insertion, turn), mesh.geometry.dim),
                 [Surface.exterior(state, domain.facets(f"top_{name}")), crack.surface(face), mouth.surface(face)],
                 contact=contact,
                 friction=Coulomb(friction) if friction else None,
                 name=f"{kind}_{name}",
             )
 
-        halves = tuple(half(*face) for face in (_FACES[:1] if revolved else _FACES))
+        halves = tuple(half(*face) for face in (FACES[:1] if revolved else FACES))
         parts = ToolParts(halves, tool)
         plate, supports = _supports(domain, state)
         mechanics = Mechanics(state, [solid, crack, mouth, *halves, parts], [plate, *supports])
@@ -241,10 +242,27 @@ def _slit(domain: TaggedMesh) -> list[NDArray[np.int32]]:
     return [domain.facets("crack"), domain.facets("notch")]
 
 
-def _path(tool: Blade | Needle, side: int, way: tuple[float, float, float | None], gdim: int) -> Path:
+def soft_contact(tool: Blade | Needle, crack: Crack, young: float) -> PenaltyContact:
+    """Contact of a tool with the faces of a crack in a solid, as soft as the force allows.
+
+    Args:
+        tool: The tool.
+        crack: The crack.
+        young: Young's modulus of the solid [stress].
+    """
+    return PenaltyContact.automatic(young, crack.normal_size, _PENALTY, blend=_BLEND * tool.tip_radius)
+
+
+def tool_path(tool: Blade | Needle, side: int, way: tuple[float, float, float | None], gdim: int) -> Path:
     """Into the notch, then pushed at unit speed without end, perhaps back once and pushed again.
 
     A half is spread from beside the plane of symmetry, a whole tool comes from above.
+
+    Args:
+        tool: The tool.
+        side: Side of the half, 0 for a whole tool.
+        way: Depth of the tip when the push begins, time until then, and depth of the turn or None.
+        gdim: Dimension of the mesh.
     """
     tip, insertion, turn = way
     start = (-side * tool.half_width(tip), -tip, 0.0) if side else (0.0, 0.0, 0.0)
