@@ -7,7 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.stepping import StepControl, run
 from cutsim.base.assembly import integrate
 from cutsim.base.compat import form
 from cutsim.bodies.loads import Support
@@ -19,6 +19,8 @@ from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.materials.library import SKIN, material
 from cutsim.materials.rubbers import MooneyRivlin, Ogden
 from cutsim.studies.layered import Layer, LayeredBlock, skin
+from cutsim.studies.layered_cut import LayeredCut
+from cutsim.tools.pointed import Blade
 
 HARD, SOFT = (Exponential.from_parameters(strength=t, toughness=G) for t, G in ((0.3, 0.06), (0.1, 0.02)))
 GLUE = Exponential.from_parameters(strength=1e3, opening=1e-4)
@@ -172,6 +174,50 @@ def test_one_law_makes_one_crack_and_a_notch_saves_its_toughness():
     assert [crack.name for crack in block.cracks] == ["crack"]
     assert "top_fracture" not in columns
     assert columns["core_fracture"][0] == pytest.approx(0.2 * HARD.toughness[0], rel=5e-3)
+
+
+def sliced(comm, depth=0.5):
+    """A blade through a stiff layer into a soft one, steps fixed: problem and history."""
+    laws = [Exponential.from_parameters(opening=0.2, toughness=G) for G in (0.1, 0.04)]
+    layers = [
+        Layer("film", 0.3, NeoHookean(1.0, 0.4), laws[0]),
+        Layer("base", 0.7, NeoHookean(0.3, 0.4), laws[1]),
+    ]
+    thicknesses = {layer.name: layer.thickness for layer in layers}
+    domain = laminate(comm, thicknesses, length=1.0, size=0.1, band=0.3, notch=0.2)
+    block = LayeredBlock.build(layers, domain, damping=0.003)
+    cut, rows = LayeredCut.build(block, Blade(0.3, 0.1, 0.15), notch=0.2, drawn=0.1), []
+
+    def record(report):
+        columns = report.columns | cut.columns(report.columns)
+        rows.append({name: value for name, (value, _) in columns.items()})
+
+    run(cut.mechanics, cut.time_of(depth), StepControl.fixed(0.05), record)
+    return cut, {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+@pytest.mark.mpi
+def test_blade_cuts_layers():
+    """The plate carries the blade's force, the audit closes, the layers add up; on any number of ranks alike."""
+    cut, rows = sliced(MPI.COMM_WORLD)
+    assert rows["depth"][-1] == pytest.approx(0.5)
+    assert rows["force"].max() > 0.01
+    assert np.all(rows["imbalance"] < 1e-6 * rows["force"].max())
+    assert np.abs(rows["energy_closure"]).max() < 2e-2
+    for kind in ("strain", "fracture"):
+        parts = sum(rows[f"{layer.name}_{kind}"] for layer in cut.block.layers)
+        np.testing.assert_allclose(parts, rows[f"energy_{kind}"], rtol=1e-9, atol=1e-12)
+    assert rows["film_fracture"][-1] > rows["base_fracture"][-1] > 0
+    _, alone = sliced(MPI.COMM_SELF)
+    np.testing.assert_allclose(rows["force"], alone["force"], atol=1e-7 * alone["force"].max())
+
+
+def test_a_cut_needs_a_notch():
+    block = laminated(2)
+    with pytest.raises(ValueError, match="block has no notch"):
+        LayeredCut.build(block, Blade(0.3, 0.1, 0.15), notch=0.2)
+    with pytest.raises(ValueError, match=r"notch = 0\.05 is not allowed"):
+        LayeredCut.build(block, Blade(0.3, 0.1, 0.15), notch=0.05)
 
 
 def test_skin_has_the_models_of_the_thesis():

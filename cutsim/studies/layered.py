@@ -128,14 +128,18 @@ class LayeredBlock:
         """Solids and cracks, for the mechanical problem."""
         return [*self.solids, *self.cracks, *([] if self.notch is None else [self.notch])]
 
+    def layers_of(self, crack: Crack) -> list[Layer]:
+        """The layers through which a part of the crack goes."""
+        return _parts(self.layers, self.domain)[self.cracks.index(crack)]
+
     def columns(self, _: Columns) -> Columns:
         """Energies of each layer: held by its strain, and spent on the crack in it. Collective."""
         columns: Columns = {}
         for solid in self.solids:
             columns[f"{solid.name}_strain"] = (solid.energies()["strain"], "energy")
-        for crack, part in zip(self.cracks, _parts(self.layers, self.domain), strict=True):
+        for crack in self.cracks:
             spent = crack.point_values("dissipated")
-            for layer in part:
+            for layer in self.layers_of(crack):
                 within = np.isin(crack.points.facets, self.domain.facets(_group(layer)))
                 columns[f"{layer.name}_fracture"] = (crack.points.integral(spent * within[:, None]), "energy")
         return columns

@@ -1,0 +1,244 @@
+# # Cutting skin, layer by layer
+#
+# A blade cuts a block of skin of eight layers: five of epidermis, two of dermis, and the fat below.  The epidermis is a
+# tenth of a millimetre thick and its thinnest layers a hundredth, the block is 2 mm high and 4 mm long; the stiffest
+# layer is eight hundred times as stiff as the softest.
+#
+# ## The layers
+#
+# The models are those of the thesis (section 5.2.1): neo-Hookean epidermis, Ogden's dermis, Mooney–Rivlin fat.  It
+# prints no values; those here are in `cutsim.materials.library` with their sources, and with what in them is assumed.
+#
+# **What the cut costs is assumed.**  The toughness found for skin spans orders of magnitude with the tool and its size,
+# and no source separates the layers.  The values below, 20 and 30 J/m² for epidermis and dermis and 1 J/m² for fat,
+# are of the order that a microscopic penetrator has to spend; a torn dermis takes a hundred times as much.
+#
+# ## The cut
+#
+# In plane strain, per millimetre of width.  The far ends of the block are held where the skin goes on; before the cut
+# they are drawn apart by 5 %, since skin on a body is under tension.  This opens the wound and helps the blade.  The
+# fat rests on a smooth plate.  A blade of 12° half angle is spread apart in a notch of 50 µm, which goes through the
+# first three layers, and then pushed at unit speed.
+#
+# What is to be expected: first the skin bends into the soft fat, until the force is large enough to cut; the force then
+# is of the order of the toughness of the layer at the tip, less what the tension of the skin gives; and each layer that
+# is cut through has taken its toughness times its thickness.
+
+import logging
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import matplotlib
+import numpy as np
+import typer
+import ufl
+from dolfinx import fem
+from matplotlib.figure import Figure
+from mpi4py import MPI
+
+from cutsim import Blade, Exponential, LayeredBlock, StepControl, laminate, run
+from cutsim.base.compat import expression
+from cutsim.results.output import write_summary
+from cutsim.results.pictures import draw_body, gather_grid, prism
+from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.recording import Recording
+from cutsim.studies.insertion import TIP_IN_NOTCH
+from cutsim.studies.layered import Layer, skin
+from cutsim.studies.layered_cut import LayeredCut
+
+COMM = MPI.COMM_WORLD
+HALF_ANGLE, HALF_THICKNESS = float(np.deg2rad(12.0)), 0.2  # of the blade [mm]
+LENGTH = 2.0  # of each half of the block [mm]
+STRETCH = 0.05  # of the skin before the cut
+DAMPING = 0.003  # Kelvin–Voigt viscosity over Young's modulus [s], at a cutting speed of 1 mm/s
+TOUGHNESS = {"epidermis": 0.02, "dermis": 0.03, "hypodermis": 0.001}  # [N/mm]
+
+# The openings at which the laws peak, 2.5 elements and for fat ten, keep the strength below the stiffness and let the
+# mesh resolve the zone in which the layers come apart.
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Elements along the crack, which is also the tip radius; notch; depth of the cut [mm]."""
+
+    size: float
+    notch: float
+    depth: float
+
+    @property
+    def laws(self) -> tuple[Exponential, Exponential, Exponential]:
+        """Cohesive laws of epidermis, dermis and hypodermis."""
+        openings = (2.5 * self.size, 2.5 * self.size, 10 * self.size)
+        first, second, third = (
+            Exponential.from_parameters(opening=opening, toughness=toughness)
+            for opening, toughness in zip(openings, TOUGHNESS.values(), strict=True)
+        )
+        return first, second, third
+
+
+SETTINGS = {False: Setting(0.02, 0.05, 1.45), True: Setting(0.04, 0.09, 1.0)}
+
+History = dict[str, np.ndarray]
+Summary = dict[str, float | list[float]]
+
+
+def main(
+    depth: Annotated[float | None, typer.Option(help="depth of the cut in mm")] = None,
+    stretch: Annotated[float, typer.Option(min=0.0, help="stretch of the skin before the cut")] = STRETCH,
+    quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/skin_layers"),
+) -> None:
+    """Cut through the eight layers of skin."""
+    begun = time.perf_counter()
+    logging.basicConfig(level=logging.WARNING if COMM.rank == 0 else logging.ERROR, format="%(name)s: %(message)s")
+    setting = SETTINGS[quick]
+    cut = build(setting, stretch)
+    until = cut.time_of(depth or setting.depth)
+    history = push(cut, until, setting.size, out)
+    draw(cut, history, out)
+    if history["time"][-1] < until:
+        raise typer.Exit(1)  # interrupted: what was recorded stays
+    summary = summarise(cut, history, time.perf_counter() - begun)
+    write_summary(out / "summary.json", summary, COMM)
+    check(cut, summary, history)
+
+
+def build(setting: Setting, stretch: float) -> LayeredCut:
+    """Mesh, layers and blade."""
+    layers = skin(*setting.laws)
+    thicknesses = {layer.name: layer.thickness for layer in layers}
+    size = setting.size
+    domain = laminate(COMM, thicknesses, length=LENGTH, size=size, band=6 * size, notch=setting.notch)
+    block = LayeredBlock.build(layers, domain, damping=DAMPING)
+    blade = Blade(HALF_ANGLE, size, HALF_THICKNESS)
+    return LayeredCut.build(block, blade, notch=setting.notch, drawn=stretch * LENGTH)
+
+
+def push(cut: LayeredCut, until: float, size: float, out: Path) -> History:
+    """Insert and push the blade. Collective."""
+    with Recording(
+        out,
+        cut.mechanics,
+        until,
+        title="skin",
+        show={"depth": "depth", "force": "force"},
+        extra=cut.columns,
+        every=20,
+    ) as recording:
+        insertion = StepControl(first=0.05, largest=0.1, smallest=1e-5)
+        run(cut.mechanics, cut.insertion, insertion, recording)
+        run(cut.mechanics, until, StepControl(first=size / 4, largest=size, smallest=1e-5), recording)
+    return recording.columns()
+
+
+# ## What came out
+
+
+def summarise(cut: LayeredCut, history: History, seconds: float) -> Summary:
+    """Headline numbers."""
+    depth, force = history["depth"], history["force"]
+    summary: Summary = {
+        "depth": float(depth[-1]),
+        "largest_force": float(force.max()),
+        **{f"{layer.name}_fracture": float(history[f"{layer.name}_fracture"][-1]) for layer in cut_through(cut)},
+        "largest_closure": float(np.abs(history["energy_closure"]).max()),
+        "largest_imbalance": float(history["imbalance"].max() / force.max()),
+        "steps": len(depth),
+        "rejected_steps": float(history["cuts"].sum()),
+        "newton_iterations": float(history["newton"].sum()),
+        "degrees_of_freedom": cut.block.state.V.dofmap.index_map.size_global * 2,
+        "ranks": COMM.size,
+        "seconds": seconds,
+    }
+    if COMM.rank == 0:
+        for name, value in summary.items():
+            typer.echo(f"{name:>34}  {value:.6g}")
+    return summary
+
+
+def cut_through(cut: LayeredCut) -> list[Layer]:
+    """Layers all of whose bond has broken. Collective."""
+    found = []
+    for crack in cut.block.cracks:
+        damage = crack.facet_mean("damage")
+        for layer in cut.block.layers_of(crack):
+            within = np.isin(crack.points.facets, cut.block.domain.facets(f"crack_{layer.name}"))
+            if COMM.allreduce(float(damage[within].min(initial=1.0)), MPI.MIN) > 0.99:
+                found.append(layer)
+    return found
+
+
+def draw(cut: LayeredCut, history: History, out: Path) -> None:
+    """Force, energies of the layers, audit, and the cut skin by its layers and by its stress."""
+    if COMM.rank == 0:
+        plot_curves(
+            out / "force.png",
+            [Curve(history["depth"], history["force"], "force on the blade")],
+            xlabel="depth of the tip [mm]",
+            ylabel="force per width [N/mm]",
+            title="Cutting skin",
+            references={"toughness of the dermis": TOUGHNESS["dermis"]},
+        )
+        plot_layers(cut.block, history, out / "layer_energies.png")
+        plot_energy(out / "energy.png", history, x="time", xlabel="way of the blade [mm]")
+    block, space = cut.block, fem.functionspace(cut.block.state.mesh, ("DG", 0))
+    number, stress = fem.Function(space), fem.Function(space)
+    for i, solid in enumerate(block.solids, start=1):
+        deviator = ufl.dev(solid.cauchy_stress(block.state.u))
+        mises = 1e3 * ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
+        stress.interpolate(expression(mises, space.element.interpolation_points(), space.mesh), solid.cells)
+        number.x.array[space.dofmap.list[solid.cells, 0]] = i
+    grid = gather_grid(block.state.u, {"layer": number, "stress": stress})
+    tip = np.asarray(cut.contacts[0].position.value)
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    labels = {"layer": "layer, from the surface downwards", "stress": "von Mises stress [kPa]"}
+    for field, label in labels.items():
+        draw_body(
+            out / f"{field}.png",
+            grid,
+            field,
+            label=label,
+            tool=prism(cut.blade.outline(1.0 - tip[1]), tip, axes),
+            window=(-0.9, 0.9, tip[1] - 0.3, 0.3, 0.0, 0.0),
+            limits=(0.0, len(block.layers)) if field == "layer" else None,
+        )
+
+
+def plot_layers(block: LayeredBlock, history: History, path: Path) -> None:
+    """What each layer holds and what the crack in it has cost, over the depth. Call it on one rank."""
+    figure = Figure(figsize=(8.0, 6.0), layout="constrained")
+    panels = figure.subplots(2, sharex=True)
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, len(block.layers)))
+    colours = dict(zip((layer.name for layer in block.layers), shades, strict=True))
+    for axes, kind in zip(panels, ("strain", "fracture"), strict=True):
+        parts = {name: history[f"{name}_{kind}"] for name in colours if f"{name}_{kind}" in history}
+        axes.stackplot(history["depth"], parts.values(), labels=parts, colors=[colours[name] for name in parts])
+        axes.set_ylabel(f"{kind} energy [mJ/mm]")
+    handles, names = panels[0].get_legend_handles_labels()
+    figure.legend(handles[::-1], [name.replace("_", " ") for name in names[::-1]], loc="outside right center")
+    panels[1].set_xlabel("depth of the tip [mm]")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=150)
+
+
+def check(cut: LayeredCut, summary: Summary, history: History) -> None:
+    """The headline numbers, asserted."""
+    for layer in cut_through(cut):
+        given = layer.law.toughness[0] * (layer.thickness - notched(cut, layer))
+        spent = history[f"{layer.name}_fracture"][-1]
+        assert abs(spent / given - 1) < 0.03, f"{layer.name}: {spent} spent, {given} given"
+    assert summary["largest_closure"] < 0.01
+    assert summary["largest_imbalance"] < 1e-6
+
+
+def notched(cut: LayeredCut, layer: Layer) -> float:
+    """How far the notch reaches into a layer [mm]."""
+    layers = cut.block.layers
+    top = sum(other.thickness for other in layers[: layers.index(layer)])
+    return float(np.clip(cut.tip / TIP_IN_NOTCH - top, 0.0, layer.thickness))
+
+
+if __name__ == "__main__":
+    typer.run(main)
