@@ -273,14 +273,14 @@ def elastic_blocks(stick=None, comm=MPI.COMM_WORLD, gdim=2):
 def test_rollback_restores_the_slip(stick):
     mechanics, friction = elastic_blocks(stick)
     history(mechanics, 0.4, StepControl.fixed(0.2))
-    before = friction.slip._anchor.x.array.copy()
+    before = friction.slip._memory.x.array.copy()
     values = {name: v.copy() for name, v in friction.slip._trial.items()}
     mechanics.begin(0.8)
     assert mechanics.solve().converged
     mechanics.evaluate()
     assert friction.dissipation().max(initial=1.0) > 0
     mechanics.rollback()
-    np.testing.assert_array_equal(friction.slip._anchor.x.array, before)
+    np.testing.assert_array_equal(friction.slip._memory.x.array, before)
     for name, v in values.items():
         np.testing.assert_array_equal(friction.slip._trial[name], v)
 

@@ -70,6 +70,7 @@ class CrackFriction(Term):
             completed(law, crack.contact.stiffness),
             ufl.as_vector([ufl.dot(response.jump, a) for a in self._frame]),
             response.pressure + tension,
+            ufl.as_ufl(0.0) if acts_on == "thesis" else response.penetration,
             share=self._share,
             tolerance=stick,
             temperature=hotter,

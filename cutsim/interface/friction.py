@@ -87,7 +87,7 @@ class Coulomb:
         """Traction along the slip since the anchor [stress]."""
         size = ufl.sqrt(ufl.dot(slip, slip) + _REST**2)
         trial, limit = self.stiffness * size, self.limit(pressure, temperature)
-        rate = self.viscosity / dt
+        rate = ufl.conditional(ufl.gt(pressure, 0), self.viscosity / dt, 0.0)
         sliding = limit + rate / (self.stiffness + rate) * (trial - limit)
         stick = ufl.le(trial, (1 + _AT_LIMIT) * limit)
         return ufl.conditional(stick, self.stiffness, sliding / size) * slip

@@ -23,6 +23,8 @@ class Response:
         demand: Loading measure of the cohesive law [its own unit].
         tension: Cohesive traction along the normal, positive where it pulls the faces together [stress].
         shear: Cohesive traction along the slide, in the components of the slide [stress].
+        penetration: Penetration that the pressure belongs to, with the part λ_N/ε_N that a multiplier makes up for;
+            negative while open [length].
         pressure: Contact pressure ≥ 0 [stress].
         damage: Damage in opening and sliding [–]; 1 without a law.
     """
@@ -31,6 +33,7 @@ class Response:
     demand: Expr
     tension: Expr
     shear: Expr
+    penetration: Expr
     pressure: Expr
     damage: tuple[Expr, Expr]
 
@@ -56,15 +59,16 @@ def respond(
         fade: Factor of the pressure in [0, 1].
     """
     opening = ufl.conditional(ufl.ge(gap, 0), gap, 0.0)
-    pressure = fade * contact.pressure(multiplier / contact.stiffness - gap)
+    depth = multiplier / contact.stiffness - gap
+    pressure = fade * contact.pressure(depth)
     if law is None:
         none, whole = ufl.as_ufl(0.0), ufl.as_ufl(1.0)
-        return Response(safe_norm(slide, _REST), none, none, 0 * slide, pressure, (whole, whole))
+        return Response(safe_norm(slide, _REST), none, none, 0 * slide, depth, pressure, (whole, whole))
     sliding = safe_norm(slide, _REST * law.opening)
     demand = law.demand(opening, sliding)
     largest = _largest(demand, kappa)
     k_n, k_t = law.stiffness(opening, sliding, largest)
-    return Response(sliding, demand, k_n * opening, k_t * slide, pressure, law.damage(largest))
+    return Response(sliding, demand, k_n * opening, k_t * slide, depth, pressure, law.damage(largest))
 
 
 def _largest(demand: Expr, kappa: Expr) -> Expr:

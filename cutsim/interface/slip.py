@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import ufl
 
-from cutsim.base.kinematics import Expr
+from cutsim.base.kinematics import Expr, positive_part
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
@@ -21,12 +21,23 @@ def completed(law: FrictionLaw, stiffness: float) -> FrictionLaw:
     return replace(law, stiffness=stiffness) if isinstance(law, Coulomb) and law.stiffness is None else law
 
 
+def _closed(before: Expr, now: Expr) -> Expr:
+    """Fraction of a step after closure, from the penetration at both ends, if it changes evenly."""
+    depth = positive_part(now)
+    return ufl.conditional(ufl.lt(before, 0), depth / (depth - before), 1.0)
+
+
 class SlipHistory:
     """Friction at the points of a surface, whatever its kinematics.
 
-    The slip is a vector s of components in a frame that turns with the surface.  The memory is the anchor a, the slip
-    at which the traction would vanish; the trial traction is ε_T (s − a).  After a step a = s − t/ε_T.  Augmentation
-    (Simo and Laursen 1992) moves the anchor within a step until facets that stick do so within a tolerance.
+    The slip is a vector s of components in a frame that turns with the surface.  The memory is the slip s₀ at the start
+    of the step and the elastic slip e that carries a traction; the trial traction is ε_T (f (s − s₀) + e).  After a
+    step e = t/ε_T.  Augmentation (Simo and Laursen 1992) raises e within a step until facets that stick do so within a
+    tolerance.
+
+    A point that closes within a step rubs from there on: with the penetration δ, negative while it is open,
+    f = δ/(δ − δ₀) is the fraction of the step after closure on a straight path, and 1 if it was closed before.  So the
+    traction of a point that comes down obliquely does not depend on the step.
 
     Args:
         state: Displacement and time.
@@ -34,6 +45,7 @@ class SlipHistory:
         law: Friction law with a tangential penalty.
         slip: Slip s, a vector [length].
         pressure: Contact pressure [stress].
+        penetration: Penetration δ that goes with the pressure, negative while the point is open [length].
         share: Fraction of the area on which friction acts, in [0, 1].
         project: Projection of a slip to the tangential plane, if the frame is not tangential by itself.
         tolerance: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
@@ -50,6 +62,7 @@ class SlipHistory:
         law: FrictionLaw,
         slip: Expr,
         pressure: Expr,
+        penetration: Expr,
         *,
         share: Expr = 1.0,
         project: Callable[[Expr], Expr] = lambda slip: slip,
@@ -57,16 +70,23 @@ class SlipHistory:
         temperature: Expr | None = None,
     ) -> None:
         self.points, self._tolerance, self._compliance = points, tolerance, law.compliance
+        # augmentation leaves no elastic slip that energy is stored in
+        self._elastic = law.compliance if tolerance is None else 0.0
         symbolic: FrictionLaw = with_constants(state.mesh, law)
-        self._anchor = points.function(len(slip))
-        # a function with one component is a scalar
-        anchor = ufl.as_vector([points.at(self._anchor)]) if len(slip) == 1 else points.at(self._anchor)
-        since = project(slip - anchor)
+        n = len(slip)
+        self._memory = points.function(2 * n + 1)
+        memory = [points.at(self._memory)[i] for i in range(2 * n + 1)]
+        closed = _closed(memory[-1], penetration)
+        slid = project(slip - ufl.as_vector(memory[:n]))
+        since = closed * slid + project(ufl.as_vector(memory[n:-1]))
         self.traction = symbolic.traction(since, pressure, state.dt, temperature)
         size, resistance = (ufl.sqrt(ufl.dot(w, w)) for w in (since, self.traction))
         self._evaluate = points.evaluator(
             {
                 "slip": slip,
+                "slid": slid,
+                "penetration": penetration,
+                "closed": closed,
                 "traction": self.traction,
                 "advance": size - symbolic.compliance * resistance if law.compliance else size,
                 "limit": symbolic.limit(pressure, temperature),
@@ -79,59 +99,63 @@ class SlipHistory:
             ("advance", "limit", "pressure", "level", "dissipated", "held"), np.zeros_like(points.weights)
         )
         self._trial = self._old = {**start, **flat, "traction": np.zeros_like(start["traction"])}
-        self._set_anchor(self._old["traction"])
+        self._remember(self._old["traction"])
 
     def evaluate(self) -> None:
         """Slip, dissipation and stored energy of the trial step. Collective.
 
-        A step that begins to slip on its way dissipates from there on: the limit at that place is interpolated.
+        A step that begins to slip on its way dissipates from there on: the limit at that place is interpolated.  Where
+        a point closes, half of the limit dissipates over the whole way, as the mean force of the step does work.
         """
         new, old = self._evaluate(), self._old
         size = np.linalg.norm(new["traction"], axis=-1)
-        moved = np.linalg.norm(new["slip"] - old["slip"], axis=-1)
+        way = np.linalg.norm(new["slid"], axis=-1)
         advance = new["advance"]
         advance[advance <= _STICKS * (advance + self._compliance * size)] = 0.0
         if self._tolerance is not None:
-            advance = new["advance"] = np.where(advance > 0, moved, 0.0)
+            advance = new["advance"] = np.where(advance > 0, new["closed"] * way, 0.0)
         slipping = advance > 0
         new["level"] = np.where(slipping, size, new["limit"])
-        late = np.divide(advance, moved, out=np.zeros_like(moved), where=moved > 0).clip(max=1.0)
-        level = new["level"] - 0.5 * late * (new["level"] - old["level"])
+        growth = new["level"] - old["level"]
+        # the fraction of the way on which it slips; what is held elastically grows with the limit meanwhile
+        free = new["closed"] * way - self._elastic * growth
+        late = np.divide(advance, free, out=slipping.astype(float), where=free > advance)
+        rubbed = np.where(slipping, advance + (1 - new["closed"]) * way, 0.0)
         mean = 0.5 * (new["share"] + old["share"])
-        new["dissipated"] = old["dissipated"] + mean * level * advance
-        before, now = (0.5 * self._compliance * np.sum(w["traction"] ** 2, axis=-1) for w in (old, new))
-        # augmentation leaves no elastic slip to store energy in
-        new["held"] = old["held"] + (mean * (now - before) if self._tolerance is None else 0.0)
+        new["dissipated"] = old["dissipated"] + mean * (new["level"] - 0.5 * late * growth) * rubbed
+        before, now = (0.5 * self._elastic * np.sum(w["traction"] ** 2, axis=-1) for w in (old, new))
+        new["held"] = old["held"] + mean * (now - before)
         self._trial = new
 
     def augment(self) -> bool:
-        """Move the anchor so that points that stick do so better; True if one was off by too much. Collective."""
+        """Raise what is carried so that points that stick do so better; True if one was off by too much. Collective."""
         if self._tolerance is None:
             return False
         new = self._evaluate()
         size = np.linalg.norm(new["traction"], axis=-1)
         sticks = ((size < (1 - _STICKS) * new["limit"]) & (new["share"] > 0)).all(axis=1)
         # a mean over the facet: a facet has more points than its nodes could hold in place one by one
-        moved = np.moveaxis(new["slip"] - self._old["slip"], -1, 0)
+        moved = new["closed"] * np.moveaxis(new["slid"], -1, 0)
         mean = np.linalg.norm([self.points.facet_mean(component) for component in moved], axis=0)
         if self.points.maximum(np.where(sticks, mean, 0.0)) <= self._tolerance:
             return False
-        self._set_anchor(new["traction"])
+        self._remember(new["traction"])
         return True
 
     def rollback(self) -> None:
-        """Restore the committed anchor and point values."""
+        """Restore the committed memory and point values."""
         self._trial = self._old
-        self._set_anchor(self._old["traction"])
+        self._remember(self._old["traction"])
 
     def commit(self) -> None:
         """Adopt the trial step."""
         self._old = self._trial
-        self._set_anchor(self._old["traction"])
+        self._remember(self._old["traction"])
 
-    def _set_anchor(self, traction: Values) -> None:
-        """Place the anchor where the slip of the last step would carry a traction."""
-        self.points.set(self._anchor, self._old["slip"] - self._compliance * traction)
+    def _remember(self, traction: Values) -> None:
+        """Start from the slip and the penetration of the last step, and carry a traction."""
+        start, carried = self._old["slip"], self._compliance * traction
+        self.points.set(self._memory, np.concatenate([start, carried, self._old["penetration"][..., None]], axis=-1))
 
     def values(self, name: str) -> Values:
         """Trial point values: "traction", "slip" (vectors), "pressure", "advance" (slip of the step, not elastic)."""

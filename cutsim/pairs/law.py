@@ -15,6 +15,7 @@ from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.law import respond
 from cutsim.interface.slip import SlipHistory, completed
 from cutsim.pairs.pairing import Array
+from cutsim.pairs.points import Pairs
 
 
 @dataclass(frozen=True)
@@ -44,15 +45,19 @@ class PairLaw:
         points: Integration points.
         laws: The laws.
         history: What the points remember of opening and damage.
+        pairs: The points and their partners at the start.
 
     Attributes:
         slip: What the points remember of friction, or None.
     """
 
-    def __init__(self, state: State, points: FacetPoints, laws: PairLaws, history: InterfaceHistory) -> None:
+    def __init__(
+        self, state: State, points: FacetPoints, laws: PairLaws, history: InterfaceHistory, pairs: Pairs
+    ) -> None:
         self._points, self._laws, self._history = points, laws, history
         self._dim = state.mesh.geometry.dim
-        self._jump = points.function(self._dim)
+        self._jump, self._met = points.function(self._dim), points.function()
+        self.set_pairs(pairs)
         jump = ufl.variable(points.at(self._jump))
         slide = ufl.as_vector([jump[i] for i in range(1, self._dim)])
         law = None if laws.cohesive is None else with_constants(state.mesh, laws.cohesive)
@@ -71,7 +76,9 @@ class PairLaw:
         if laws.friction is not None:
             friction = completed(laws.friction, laws.contact.stiffness)
             share, stick = r.damage[1], laws.stick
-            self.slip = SlipHistory(state, points, friction, slide, r.pressure, share=share, tolerance=stick)
+            # how a point without partner comes near is not known
+            depth = points.at(self._met) * r.penetration
+            self.slip = SlipHistory(state, points, friction, slide, r.pressure, depth, share=share, tolerance=stick)
             shear = [s + share * t for s, t in zip(shear, self.slip.traction, strict=True)]
         traction = ufl.as_vector([r.tension - r.pressure, *shear])
         stiffness = ufl.diff(traction, jump)
@@ -80,9 +87,13 @@ class PairLaw:
         self._traction = points.evaluator({"traction": traction})
         self._linear = points.evaluator({"traction": traction, "stiffness": ufl.as_vector(flat)})
 
-    def set_jump(self, jump: Array) -> None:
-        """Opening and slide of all points, shape (points, dimension) [length]."""
-        self._points.set(self._jump, jump.reshape(*self._points.weights.shape, self._dim))
+    def set_pairs(self, pairs: Pairs) -> None:
+        """Take opening and slide of all points, and which of them have a partner."""
+        shape = self._points.weights.shape
+        self._points.set(self._jump, pairs.jump.reshape(*shape, self._dim))
+        met = np.zeros(len(pairs.jump))
+        met[pairs.hits.points] = 1.0
+        self._points.set(self._met, met.reshape(shape))
 
     def values(self) -> dict[str, Values]:
         """Values of the law for the present jump: what `InterfaceHistory` wants, "cohesive" as a vector, and "held"."""
@@ -98,7 +109,7 @@ class PairLaw:
         return values["traction"].reshape(-1, self._dim), values["stiffness"].reshape(-1, self._dim, self._dim)
 
     def augment(self) -> bool:
-        """Move multiplier and anchor; True if one was off by more than is allowed.
+        """Move multiplier and carried shear; True if one was off by more than is allowed.
 
         The multiplier is one value a facet: at every point it would hold a facet in more places than it has nodes.
         """

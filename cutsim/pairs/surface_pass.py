@@ -64,7 +64,7 @@ class SurfacePass:
         own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
         self.weights = weight * own.ravel()
         self.history = InterfaceHistory(points, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
-        self._law = PairLaw(state, points, laws, self.history)
+        self._law = PairLaw(state, points, laws, self.history, kinematics.pairs(self._start()))
         self.slip = self._law.slip
         self._seen: Array | None = None
         self.force = self._force_old = np.zeros(self._dim)
@@ -85,7 +85,7 @@ class SurfacePass:
         if not self._state.mesh.comm.allreduce(same, op=MPI.LAND):
             self._pairs = self.kinematics.pairs(self.kinematics.nodes(u))
             self._seen = u.copy()
-            self._law.set_jump(self._pairs.jump)
+            self._law.set_pairs(self._pairs)
         return self._pairs
 
     def _shaped(self, values: Array) -> Values:
@@ -116,7 +116,7 @@ class SurfacePass:
         """Values on the way of the step, see `cutsim.interface.history.Along`."""
         (slave, master), (slave_end, master_end) = ends
         pairs = self.kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
-        self._law.set_jump(pairs.jump)
+        self._law.set_pairs(pairs)
         values = self._law.values()
         change = pairs.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
         power = np.einsum("nai,ni->na", pairs.slave.frames, change)

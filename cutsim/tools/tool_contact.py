@@ -71,6 +71,7 @@ class Patch:
                 friction,
                 surface.restrict(state.u) - position,
                 self._pressure,
+                self._penetration,
                 project=lambda slip: tangential(slip, normal),
                 temperature=None if temperature is None else surface.restrict(temperature),
             )
