@@ -10,8 +10,8 @@
 # prints no values; those here are in `cutsim.materials.library` with their sources, and with what in them is assumed.
 #
 # **What the cut costs is assumed.**  The toughness found for skin spans orders of magnitude with the tool and its size,
-# and no source separates the layers.  The values below, 20 and 30 J/m² for epidermis and dermis and 1 J/m² for fat,
-# are of the order that a microscopic penetrator has to spend; a torn dermis takes a hundred times as much.
+# and no source separates the layers.  The values below, 20 and 30 J/m² for epidermis and dermis and 1 J/m² for fat, are
+# of the order that a microscopic penetrator has to spend (see the page on layers).
 #
 # ## The cut
 #

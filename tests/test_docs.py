@@ -76,6 +76,14 @@ def test_large_sliding():
     assert page["cutting"].terms[1].name == "wedge"
 
 
+def test_skin_layers():
+    page = run_page("skin_layers")
+    last = {name: value for name, (value, _) in page["rows"][-1].items()}
+    assert last["depth"] == pytest.approx(0.4)
+    assert last["force"] > 0 and last["imbalance"] < 1e-6 * last["force"]
+    assert "papillary_dermis_fracture" in last and "stratum_corneum_fracture" not in last
+
+
 def test_dynamics():
     momenta = run_page("dynamics")["momenta"]
     assert len(momenta) > 50
