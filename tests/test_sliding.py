@@ -11,7 +11,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.stepping import StepControl, run
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
@@ -253,6 +253,45 @@ def test_augmentation(gdim):
     mechanics.evaluate()
     assert pair.penetration() < 1e-4
     np.testing.assert_allclose(b.state.mesh.comm.allreduce(stresses(b).min(), MPI.MIN), -E * 0.005, rtol=5e-3)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_from_stick_to_slip_without_penetration(gdim):
+    """A block on a rigid slab: no penetration, no slide where it sticks, slip from the edges, and μ N in the end."""
+    mu, up, tolerance = 0.3, gdim - 1, 1e-4
+    if gdim == 2:
+        b, h = stack(((-0.5, -0.5), (2.5, 0.0), (11, 1)), ((0.0, 0.0), (2.0, 0.5), (10, 2))), 0.25
+    else:
+        b, h = (
+            stack(((-0.5, -0.5, -0.5), (2.5, 1.5, 0.0), (7, 5, 1)), ((0.0, 0.0, 0.0), (2.0, 1.0, 0.5), (4, 3, 1))),
+            0.5,
+        )
+    contact = PenaltyContact(40 * E / h)
+    pair = b.pair(friction=Coulomb(mu), contact=contact, penetration=tolerance * h, stick=tolerance * h)
+    rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
+    path = [lambda t: 0.05 * max(t - 1, 0.0), *[0.0] * (gdim - 2), lambda t: -0.05 * min(t, 1.0)]
+    mechanics = Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), pair], rigid + b.drive(1, 1, path, "top"))
+    first, partial, before = pair.passes[0], 0, 0.0
+
+    def watch(report):
+        nonlocal partial, before
+        assert report.cuts == 0
+        trial, points = first.history.trial, first.points
+        assert points.maximum(-points.facet_mean(trial["opening"])[:, None]) < tolerance * h
+        sticks = ((first.slip.values("advance") == 0) & (trial["pressure"] > 0)).all(axis=1)
+        slides = np.array([points.facet_mean(s) for s in np.moveaxis(first.slip.values("slip"), -1, 0)])
+        slid = np.linalg.norm(slides - before, axis=0)[sticks]
+        assert slid.max(initial=0.0) < tolerance * h
+        before = slides
+        partial += min(first.slip.areas()) > 0.1
+
+    run(mechanics, 1.0, StepControl(first=1.0, largest=1.0, line_searches=LINE_SEARCHES), watch)
+    run(mechanics, 3.0, StepControl(first=0.25, largest=0.25, line_searches=LINE_SEARCHES), watch)
+    assert partial > 3, "some facets stick while others slip"
+    assert first.slip.areas()[0] == 0.0
+    force = pair.force()
+    assert np.linalg.norm(force[:up]) == pytest.approx(mu * abs(force[up]), rel=1e-3)
 
 
 # -- sliding ----------------------------------------------------------------------------------------------------------
