@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 import ufl
-from dolfinx import fem, la
+from dolfinx import fem
 from dolfinx.common import Timer
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from cutsim.base.options import Options
 from cutsim.base.terms import Multiplier, Term
 from cutsim.solvers.multipliers import Multipliers
 from cutsim.solvers.preconditioners import LaggedPC, Preset, create_lagged, fallback_for, preset_for
+from cutsim.solvers.residual import Residual
 from cutsim.solvers.tangent import Tangent
 
 log = logging.getLogger(__name__)
@@ -130,41 +131,32 @@ class NonlinearProblem:
         self._symmetric, self._interface_dofs, self._by_start = symmetric, interface_dofs, inertia or not bcs
         if J is None:
             J = ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
-        self._L, self._a = (
+        L, a = (
             compat.form(
                 form, entity_maps=entity_maps, jit_options=jit_options, form_compiler_options=form_compiler_options
             )
             for form in (F, J)
         )
         self._terms = tuple(terms)
+        self._forces = Residual(L, a, u, bcs, terms)
+        self.known, self.fixed = self._forces.known, self._forces.fixed
+        self._tangent = Tangent(a, u.function_space, symmetric, terms)
         self._multipliers = Multipliers(multipliers, u, bcs)
         self._create_vectors()
-        self._tangent = Tangent(self._a, u.function_space, symmetric, terms)
         self._create_snes(rtol)
 
     def _create_vectors(self) -> None:
-        V = self.u.function_space
-        layout = V.dofmap.index_map, V.dofmap.index_map_bs
-        self._comm: MPI.Comm = V.mesh.comm
-        self._n = layout[0].size_local * layout[1]
-        self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
-        self._added = la.create_petsc_vector(*layout)
+        mesh = self.u.function_space.mesh
+        self._comm: MPI.Comm = mesh.comm
         # SNES iterates on a vector of its own, displacement first, then multipliers: were it that of u, line searches
         # would spoil their own start.
         self._x = PETSc.Vec().createWithArray(self._unknowns(), comm=self._comm)
         self._f = self._x.duplicate()
         self._n_dofs = self._x.size
-        self.known: NDArray[np.float64] = np.zeros(self._n)
-        self.fixed = np.zeros(self._n, dtype=bool)
-        for bc in self.bcs:
-            dofs = bc.dof_indices()[0]
-            self.fixed[dofs[dofs < self._n]] = True
-        # among all unknowns
-        self._held = np.flatnonzero(self.fixed)
-        self._free = np.setdiff1d(np.arange(self._x.local_size), self._held)
+        self._free = np.setdiff1d(np.arange(self._x.local_size), self._forces.held)
         self._previous_scale = 0.0
-        cells = np.arange(V.mesh.topology.index_map(V.mesh.topology.dim).size_local, dtype=np.int32)
-        h = np.max(V.mesh.h(V.mesh.topology.dim, cells), initial=0.0)
+        cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+        h = np.max(mesh.h(mesh.topology.dim, cells), initial=0.0)
         self._h = self._comm.allreduce(h, MPI.MAX)
 
     def _create_snes(self, rtol: float) -> None:
@@ -245,8 +237,7 @@ class NonlinearProblem:
     def _iterate(self) -> tuple[int, int]:
         """Run SNES, again after each failure of the linear solver that a better preconditioner may cure."""
         self._x.array[:] = self._unknowns()
-        for bc in self.bcs:
-            bc.set(self._g.array, None, 1.0)
+        self._forces.prescribe()
         self._residuals: list[float] = []
         self._size = 0.0
         self._scale = self._previous_scale
@@ -302,10 +293,7 @@ class NonlinearProblem:
         Returns:
             A new vector of the owned dofs; the caller owns it.
         """
-        self._assemble_residual(lift=False)
-        b = self._added.duplicate()
-        b.array[:] = self._r.array[: self._n]
-        return b
+        return self._forces.vector()
 
     def reactions(self) -> PETSc.Vec:
         """Forces of the supports on the body at the present u: `residual` on constrained rows, zero elsewhere.
@@ -322,50 +310,21 @@ class NonlinearProblem:
         self._snes.setJacobian(self._evaluate_tangent, A)
 
     def _unknowns(self) -> NDArray[np.float64]:
-        return np.concatenate([self.u.x.array[: self._n], self._multipliers.values])
+        return np.concatenate([self.u.x.array[: self._forces.n], self._multipliers.values])
 
     def _assign(self, x: PETSc.Vec) -> None:
-        self.u.x.array[: self._n] = x.array_r[: self._n]
+        n = self._forces.n
+        self.u.x.array[:n] = x.array_r[:n]
         self.u.x.scatter_forward()
-        self._multipliers.assign(x.array_r[self._n :])
-
-    def _assemble_residual(self, *, lift: bool) -> None:
-        for term in self._terms:
-            term.prepare()
-        r = self._r.array
-        r[:] = 0.0
-        fem.assemble_vector(r, self._L)
-        if lift:
-            fem.apply_lifting(r, [self._a], [self.bcs], [self.u.x.array], -1.0)
-        self._r.scatter_reverse(la.InsertMode.add)
-        r[: self._n] += self.known
-        if self._terms:
-            self._add_terms(lift)
-
-    def _add_terms(self, lift: bool) -> None:
-        """Add the forces of terms that assemble themselves, and the lifting of prescribed increments."""
-        jump = self._lifted.array
-        jump[:] = 0.0
-        jump[: self._n][self.fixed] = (self._g.array - self.u.x.array)[: self._n][self.fixed]
-        self._lifted.scatter_forward()
-        lift = lift and self._comm.allreduce(bool(jump.any()), MPI.LOR)
-        self._added.set(0.0)
-        for term in self._terms:
-            term.add_forces(self._added, jump if lift else None)
-        self._added.assemble()
-        self._r.array[: self._n] += self._added.array_r
+        self._multipliers.assign(x.array_r[n:])
 
     def _evaluate_residual(self, snes: PETSc.SNES, x: PETSc.Vec, b: PETSc.Vec) -> None:
         """Called by SNES: residual with lifting; u - g in the constrained rows."""
         self._assign(x)
-        self._assemble_residual(lift=True)
-        b.array[:] = np.concatenate([self._r.array[: self._n], self._multipliers.residual()])
+        b.array[:] = np.concatenate([self._forces.assemble(lift=True), self._multipliers.residual()])
         # While prescribed values do not hold, these rows carry lifting too; but then u is no solution either.
-        self._reaction = b.array_r[self._held]
-        b.array[self._held] = self._jump(x)
-
-    def _jump(self, x: PETSc.Vec) -> NDArray[np.float64]:
-        return x.array_r[self._held] - self._g.array[self._held]
+        self._reaction = b.array_r[self._forces.held]
+        b.array[self._forces.held] = self._forces.violation(x.array_r)
 
     def _evaluate_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Called by SNES."""
@@ -377,7 +336,7 @@ class NonlinearProblem:
 
     def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:
         """Called by SNES after the linear solve: make the step of the constrained dofs exact."""
-        y.array[self._held] = self._jump(x)
+        y.array[self._forces.held] = self._forces.violation(x.array_r)
         if self._lagged is not None:
             self._lagged.observe(self._snes.getKSP().getIterationNumber())
         return True
@@ -387,7 +346,8 @@ class NonlinearProblem:
         f, x = snes.getFunction()[0].array_r, snes.getSolution().array_r
         squares = [f[self._free], self._reaction, self._tangent.diagonal[~self.fixed]]
         free, reaction, stiffness = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
-        jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (f[self._held], x))
+        held = f[self._forces.held]
+        jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (held, x))
         self._size = max(self._size, size)
         length = self._size + self._h
         reason = self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
@@ -410,7 +370,7 @@ class NonlinearProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects and remove the options of this problem."""
-        for thing in (self._snes, self._multipliers, self._tangent, self._x, self._f, self._added):
+        for thing in (self._snes, self._multipliers, self._tangent, self._forces, self._x, self._f):
             thing.destroy()
         self._options.clear()
 

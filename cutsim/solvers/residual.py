@@ -1,0 +1,102 @@
+"""The vector of forces and how it is filled."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from dolfinx import fem, la
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.assembly import Array
+from cutsim.base.terms import Term
+
+
+class Residual:
+    """Internal minus external forces on the displacement, and its prescribed values. Every method is collective.
+
+    Args:
+        L: Compiled forces.
+        a: Their compiled tangent, through which prescribed increments are lifted.
+        u: The displacement.
+        bcs: Dirichlet conditions.
+        terms: Terms that assemble themselves.
+
+    Attributes:
+        n: Number of owned dofs.
+        known: Owned forces that are added to those of the form.
+        fixed: Which owned dofs have a Dirichlet condition ...
+        held: ... and their indices.
+    """
+
+    def __init__(
+        self, L: fem.Form, a: fem.Form, u: fem.Function, bcs: Sequence[fem.DirichletBC], terms: Sequence[Term]
+    ) -> None:
+        self._L, self._a, self._u, self._bcs, self._terms = L, a, u, list(bcs), tuple(terms)
+        V = u.function_space
+        layout = V.dofmap.index_map, V.dofmap.index_map_bs
+        self._comm: MPI.Comm = V.mesh.comm
+        self.n = layout[0].size_local * layout[1]
+        self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
+        self._added = la.create_petsc_vector(*layout)
+        self.known: Array = np.zeros(self.n)
+        self.fixed: NDArray[np.bool_] = np.zeros(self.n, dtype=bool)
+        for bc in self._bcs:
+            dofs = bc.dof_indices()[0]
+            self.fixed[dofs[dofs < self.n]] = True
+        self.held = np.flatnonzero(self.fixed)
+
+    def prescribe(self) -> None:
+        """Take the present values of the Dirichlet conditions."""
+        for bc in self._bcs:
+            bc.set(self._g.array, None, 1.0)
+
+    def violation(self, u: Array) -> Array:
+        """Displacement minus prescribed value on the constrained dofs.
+
+        Args:
+            u: Owned displacements; more unknowns may follow.
+        """
+        return u[self.held] - self._g.array[self.held]
+
+    def assemble(self, *, lift: bool) -> Array:
+        """Owned forces at the present u.
+
+        Args:
+            lift: Whether to add what the increments to the prescribed values bring through the tangent.
+        """
+        for term in self._terms:
+            term.prepare()
+        r = self._r.array
+        r[:] = 0.0
+        fem.assemble_vector(r, self._L)
+        if lift:
+            fem.apply_lifting(r, [self._a], [self._bcs], [self._u.x.array], -1.0)
+        self._r.scatter_reverse(la.InsertMode.add)
+        r[: self.n] += self.known
+        if self._terms:
+            self._add_terms(lift)
+        return r[: self.n]
+
+    def _add_terms(self, lift: bool) -> None:
+        """Add the forces of terms that assemble themselves, and the lifting of prescribed increments."""
+        jump = self._lifted.array
+        jump[:] = 0.0
+        jump[self.held] = -self.violation(self._u.x.array)
+        self._lifted.scatter_forward()
+        lift = lift and self._comm.allreduce(bool(jump.any()), MPI.LOR)
+        self._added.set(0.0)
+        for term in self._terms:
+            term.add_forces(self._added, jump if lift else None)
+        self._added.assemble()
+        self._r.array[: self.n] += self._added.array_r
+
+    def vector(self) -> PETSc.Vec:
+        """The forces without lifting as a new vector, which the caller owns."""
+        b = self._added.duplicate()
+        b.array[:] = self.assemble(lift=False)
+        return b
+
+    def destroy(self) -> None:
+        """Free the PETSc objects."""
+        self._added.destroy()
