@@ -157,6 +157,23 @@ def test_three_dimensional_shape_is_the_plane_one_swept(kind):
     np.testing.assert_allclose(values(solid, points)[0], values(plane, flat)[0], atol=1e-9)
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_half_needle_is_convex_and_has_the_surface_of_its_side(side):
+    """On its side the distance is that of the whole needle; beyond the plane it goes on as it is in the plane."""
+    push, lateral = (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)
+    half, whole = Needle(HALF, R, SHANK, push, lateral, side), Needle(HALF, R, SHANK, push)
+    a, b = np.random.default_rng(2).uniform((-1.5, -1, -1.5), (1.5, 3, 1.5), (2, 60, 3))
+    mine = side * a[:, 0] > 0
+    distance, gradient = values(half, a)
+    np.testing.assert_allclose(distance[mine], values(whole, a[mine])[0], atol=1e-12)
+    np.testing.assert_allclose(distance[~mine], values(whole, a[~mine] * (0, 1, 1))[0], atol=1e-12)
+    assert (distance[~mine] < 0).any() and (distance[mine] < 0).any()
+    assert (side * gradient[mine, 0] > 0).all(), "each face is pushed to its own side"
+    # a distance to a convex set is a convex function outside of it
+    middle = values(half, 0.5 * (a + b))[0]
+    assert (middle <= 0.5 * (np.maximum(distance, 0) + np.maximum(values(half, b)[0], 0)) + 1e-12).all()
+
+
 def test_half_width_is_the_outline():
     """On the flank, and on the shank above the rounded joint."""
     for height in (0.5, 1.0, 3.0):
@@ -181,6 +198,9 @@ def test_half_width_is_the_outline():
         (Needle, (0.2, 0.0, 1.0), "tip_radius"),
         (Needle, (0.2, 0.1, 0.1), "radius"),
         (Needle, (0.2, 0.1, 1.0, (0, 0)), "push"),
+        (Needle, (0.2, 0.1, 1.0, (0, -1), (1, 1)), "lateral"),
+        (Needle, (0.2, 0.1, 1.0, (0, -1), None, 1), "lateral"),
+        (Needle, (0.2, 0.1, 1.0, (0, -1), (1, 0), 2), "side"),
         (Plane, ((0, 0),), "normal"),
     ],
 )

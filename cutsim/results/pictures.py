@@ -103,15 +103,41 @@ def prism(
     Returns:
         The surface, None where pyvista is missing.
     """
-    try:
-        import pyvista
-    except ImportError as error:
-        logger.warning("no tool is drawn: %s", error)
+    pyvista = _library("no tool is drawn")
+    if pyvista is None:
         return None
     first, second, start = (np.pad(np.asarray(v, dtype=float), (0, 3 - len(v))) for v in (*axes, origin))
     points = start + outline[:, :1] * first + outline[:, 1:] * second
     face = pyvista.PolyData(points, faces=[len(points), *range(len(points))])
     return face if edge is None else face.extrude(np.asarray(edge, dtype=float), capping=True)
+
+
+def revolved(
+    outline: NDArray[np.float64],
+    origin: Sequence[float],
+    axes: tuple[Sequence[float], Sequence[float]],
+    points: int = 48,
+) -> pyvista.PolyData | None:
+    """A tool of revolution in space, for `draw_body`.
+
+    Args:
+        outline: Its section through the axis, rows of two coordinates; the second is along the axis of revolution.
+        origin: Where the outline has its origin; three coordinates.
+        axes: Directions of the two coordinates, orthogonal unit vectors.
+        points: Points on a circle.
+
+    Returns:
+        The surface, None where pyvista is missing.
+    """
+    pyvista = _library("no tool is drawn")
+    if pyvista is None:
+        return None
+    across, along = outline[outline[:, 0] >= 0].T
+    first, axis = (np.asarray(v, dtype=float) for v in axes)
+    turn = np.linspace(0.0, 2 * np.pi, points)[:, None]
+    directions = np.cos(turn) * first + np.sin(turn) * np.cross(axis, first)
+    x = np.asarray(origin) + across[:, None, None] * directions + along[:, None, None] * axis
+    return pyvista.StructuredGrid(*np.moveaxis(x, -1, 0)[..., None]).extract_surface(algorithm="dataset_surface")
 
 
 def draw_body(
@@ -178,6 +204,16 @@ def draw_body(
         logger.warning("%s was not drawn: %s", path, error)
 
 
+def _library(otherwise: str) -> Any:
+    """pyvista; None, with a warning of what that means, where it is missing."""
+    try:
+        import pyvista
+    except ImportError as error:
+        logger.warning("%s: %s", otherwise, error)
+        return None
+    return pyvista
+
+
 def _cell_rows(mesh: Mesh, name: str, entry: NDArray[np.float64] | fem.Function) -> NDArray[np.float64]:
     """Rows of the owned cells."""
     owned = mesh.topology.index_map(mesh.topology.dim).size_local
@@ -226,10 +262,8 @@ def _assemble(
     parts = comm.gather((table, kinds, points, dict(point_data), dict(cell_data)))
     if parts is None:
         return None
-    try:
-        import pyvista
-    except ImportError as error:
-        logger.warning("there will be no pictures of the body: %s", error)
+    pyvista = _library("there will be no pictures of the body")
+    if pyvista is None:
         return None
     table, kinds, points = (np.concatenate([part[i] for part in parts]) for i in range(3))
     cells = np.insert(table, 0, table.shape[1], axis=1).ravel()

@@ -123,6 +123,38 @@ def plot_energy(
         _save(figure, path)
 
 
+def plot_parts(
+    path: Path | str,
+    x: ArrayLike,
+    parts: Mapping[str, ArrayLike],
+    total: ArrayLike,
+    *,
+    xlabel: str,
+    ylabel: str,
+    title: str = "",
+) -> None:
+    """Plot a quantity as the stack of its parts. Call it on one rank.
+
+    Args:
+        path: The file; its suffix tells the format. Folders are made.
+        x: Abscissae.
+        parts: Label -> ordinates of a part >= 0, from the bottom upwards; parts that vanish are left out.
+        total: The quantity itself, drawn as a line.
+        xlabel: Text at the abscissa, with the unit.
+        ylabel: Text at the ordinate and in the legend, with the unit.
+        title: Text above the plot.
+    """
+    shown = {label: part for label, part in parts.items() if np.any(part)}
+    with matplotlib.rc_context(_style()):
+        figure = Figure()
+        axes = figure.add_subplot(xlabel=xlabel, ylabel=ylabel, title=title)
+        axes.stackplot(x, *shown.values(), labels=shown.keys(), colors=COLOURS, alpha=0.85)
+        axes.plot(x, total, color="black", label="in all")
+        handles, texts = axes.get_legend_handles_labels()
+        axes.legend(handles[::-1], texts[::-1], loc="upper left")
+        _save(figure, path)
+
+
 def _style() -> dict[str, Any]:
     return {
         "figure.figsize": (7.0, 4.4), "figure.constrained_layout.use": True, "savefig.dpi": 150,

@@ -34,9 +34,9 @@ from cutsim.tools.shapes import Path
 from cutsim.tools.tool_contact import ToolContact, warn_coarse
 from cutsim.tools.tool_parts import PARTS, ToolParts
 
-# measured on blade cuts: stiff enough for the force, soft enough for Newton's method (pressure per length over E)
-_PENALTY = 5.0
-_BLEND = 0.4
+# measured: stiff enough for the force, soft enough for Newton's method; a needle is pressed harder than a blade, all
+# along its shaft (penalty times h over E, blend over tip radius)
+_CONTACT = {Blade: (5.0, 0.4), Needle: (20.0, 0.1)}
 _ENDLESS = 1e3
 #: Depth of the tip, as a part of the depth of the notch, when the push begins.
 TIP_IN_NOTCH = 0.8
@@ -250,7 +250,8 @@ def soft_contact(tool: Blade | Needle, crack: Crack, young: float) -> PenaltyCon
         crack: The crack.
         young: Young's modulus of the solid [stress].
     """
-    return PenaltyContact.automatic(young, crack.normal_size, _PENALTY, blend=_BLEND * tool.tip_radius)
+    factor, blend = _CONTACT[type(tool)]
+    return PenaltyContact.automatic(young, crack.normal_size, factor, blend=blend * tool.tip_radius)
 
 
 def tool_path(tool: Blade | Needle, side: int, way: tuple[float, float, float | None], gdim: int) -> Path:

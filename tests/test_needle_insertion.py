@@ -1,0 +1,234 @@
+"""Needle and blade driven in: closed forms of the force and its parts, two insertions, planar crack in space."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from cutsim import Blade, Exponential, Needle, NeoHookean, StepControl, read_geo, run
+from cutsim.studies.insertion import Insertion
+from cutsim.studies.insertion_work import TwoInsertions, force_parts, recovered_toughness
+
+MESHES = Path(__file__).parents[1] / "meshes"
+YOUNG, POISSON, TOUGHNESS, FRICTION = 0.777, 0.48, 0.1, 0.1
+THREAD, RADIUS, OUTER = 0.2, 0.5, 4.0
+ROUND = {"r0": THREAD, "R": OUTER, "H": 4.0, "notch": 0.5, "deep": 2.5, "lc": 0.075}
+BLOCK = {"L": 3.0, "B": 3.0, "H": 3.2, "notch": 1.0, "slit": 0.7, "deep": 2.4, "band": 0.35, "lc": 0.35, "growth": 2.0}
+SPLIT = {"dim": 2, "Lx": 3.0, "H": 4.0, "lc": 0.1, "band": 0.3, "growth": 1.6, "notch": 0.5}
+
+
+def thread(comm=MPI.COMM_WORLD, *, friction=0.0, turn=None, **sizes):
+    """A needle on the axis of a body of revolution."""
+    domain = read_geo(MESHES / "thread.geo", comm, ROUND | sizes, gdim=2)
+    needle = Needle(np.radians(30), 0.15, RADIUS)
+    law = Exponential.from_parameters(strength=1.0, toughness=TOUGHNESS)
+    material = NeoHookean(YOUNG, POISSON)
+    return Insertion.build(domain, material, law, needle, notch=0.5, friction=friction, viscosity=0.002, turn=turn)
+
+
+def planar(comm=MPI.COMM_WORLD, **sizes):
+    """A needle that splits a block."""
+    domain = read_geo(MESHES / "needle.geo", comm, BLOCK | sizes, gdim=3)
+    needle = Needle(np.radians(25), 0.4, 1.0, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
+    law = Exponential.from_parameters(strength=0.3, toughness=0.15)
+    return Insertion.build(domain, NeoHookean(YOUNG, 0.45), law, needle, notch=1.0, viscosity=0.002)
+
+
+def split(*, friction=0.0, turn=None):
+    """A blade in plane strain."""
+    domain = read_geo(MESHES / "block.geo", MPI.COMM_WORLD, SPLIT, gdim=2)
+    law = Exponential.from_parameters(strength=0.6, toughness=0.2)
+    blade = Blade(np.radians(20), 0.1, 0.6)
+    material = NeoHookean(YOUNG, 0.45)
+    return Insertion.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=0.002, turn=turn)
+
+
+def drive(cut, until, control):
+    """Run to a time and return the columns, with an entry for each step."""
+    rows = []
+    run(
+        cut.mechanics, until, control,
+        lambda r: rows.append({"time": (r.time, ""), **r.columns, **cut.columns(r.columns)}),
+    )  # fmt: skip
+    return {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
+
+
+@cache
+def needle_twice(friction):
+    cut = thread(friction=friction, turn=1.7)
+    return cut, drive(cut, cut.time_of(1.7, 2), StepControl(first=0.02, largest=0.1))
+
+
+@cache
+def blade_twice(friction):
+    cut = split(friction=friction, turn=2.0)
+    return cut, drive(cut, cut.time_of(2.0, 2), StepControl(first=0.02, largest=0.1))
+
+
+@cache
+def in_space():
+    cut = planar()
+    return cut, drive(cut, cut.time_of(1.8), StepControl(first=0.1, largest=0.2))
+
+
+def widening(hole):
+    """Pressure in the hole of a thick incompressible cylinder, and the work per length to widen it that far."""
+    radius = np.linspace(THREAD, hole, 2001)
+    outer = np.sqrt(OUTER**2 + radius**2 - THREAD**2)
+    inner, outer = radius / THREAD, outer / OUTER
+    pressure = YOUNG / (2 * (1 + POISSON)) * (np.log(inner / outer) - 0.5 * (inner**-2 - outer**-2))
+    return pressure[-1], np.trapezoid(pressure * 2 * np.pi * radius, radius)
+
+
+def at_the_end(history, *columns):
+    """Slopes of columns over the last quarter of a millimetre of the first push."""
+    first = slice(0, int(np.argmax(history["depth"])) + 1)
+    depth = history["depth"][first]
+    end = depth > depth[-1] - 0.25
+    return [np.polyfit(depth[end], history[name][first][end], 1)[0] for name in columns]
+
+
+def test_the_steady_force_is_that_of_the_thread_and_of_the_hole():
+    """Tearing 2πr₀G_c off and widening the hole like a thick cylinder's: each takes its part of the force."""
+    _, history = needle_twice(0.0)
+    strain, contact, fracture, work = at_the_end(
+        history, "energy_strain", "energy_contact", "energy_fracture", "work_external"
+    )
+    _, widened = widening(THREAD + history["crack_opening"].max())
+    torn = 2 * np.pi * THREAD * TOUGHNESS
+    assert strain == pytest.approx(widened, rel=0.02)
+    assert fracture == pytest.approx(torn, rel=0.05)
+    assert work == pytest.approx(torn + widened + contact, rel=0.05)
+    assert contact < 0.02 * work
+
+
+@pytest.mark.parametrize("friction", [0.0, FRICTION])
+def test_tip_and_shaft_are_the_whole_tool(friction):
+    _, history = needle_twice(friction)
+    scale = history["force"].max()
+    np.testing.assert_allclose(history["tip_force"] + history["shaft_force"], history["force"], atol=1e-10 * scale)
+    work = history["tip_friction_work"] + history["shaft_friction_work"]
+    np.testing.assert_allclose(work, history["energy_friction"], atol=1e-10 * history["work_external"].max())
+    # nothing but friction holds a shaft
+    np.testing.assert_allclose(history["shaft_force"], history["shaft_friction"], atol=1e-10 * scale)
+
+
+def test_the_parts_of_the_force_are_those_of_the_audit():
+    """They add up to it in every window; friction on the shaft grows while cutting becomes steady."""
+    _, history = needle_twice(FRICTION)
+    parts = force_parts(history, 1.0, 0.2)
+    names = ("deformation", "cutting", "tip friction", "shaft friction", "viscosity")
+    late = parts["depth"] > 0.9
+    np.testing.assert_allclose(sum(parts[n] for n in names)[late], parts["force"][late], rtol=0.01)
+    assert np.diff(parts["shaft friction"][late]).min() > 0, "more and more of the shaft is in the body"
+    np.testing.assert_allclose(parts["cutting"][-2:], 2 * np.pi * THREAD * TOUGHNESS, rtol=0.05)
+    assert not parts["shaft friction"][parts["depth"] < 0.6].any(), "the shaft begins higher up"
+    with pytest.raises(ValueError, match=r"window = 2\.0 is not allowed"):
+        force_parts(history, 1.0, 2.0)
+
+
+def test_the_shaft_rubs_with_the_pressure_of_the_widened_hole():
+    """Depth adds μ × pressure × circumference to the force on the shaft: an estimate, as the body is short."""
+    _, history = needle_twice(FRICTION)
+    hole = THREAD + history["crack_opening"].max()
+    (slope,) = at_the_end(history, "shaft_force")
+    assert slope == pytest.approx(FRICTION * widening(hole)[0] * 2 * np.pi * hole, rel=0.2)
+
+
+@pytest.mark.parametrize("friction", [0.0, FRICTION])
+@pytest.mark.parametrize(
+    ("twice", "toughness"), [(needle_twice, TOUGHNESS), (blade_twice, 0.2)], ids=["needle", "blade"]
+)
+def test_two_insertions_differ_by_the_new_surface(twice, toughness, friction):
+    cut, history = twice(friction)
+    both = TwoInsertions.of(history, cut)
+    assert both.toughness == pytest.approx(toughness, rel=0.03)
+    assert np.abs(history["energy_closure"]).max() < 0.015
+    assert np.diff(history["energy_friction"]).min() >= 0
+    broken = np.interp(cut.time_of(cut.turn), history["time"], history["energy_fracture"])
+    assert history["energy_fracture"][-1] == pytest.approx(broken, rel=0.02), "the second time hardly anything breaks"
+
+
+def test_friction_of_the_tip_adds_to_the_apparent_toughness():
+    """What parts the faces presses on the flanks: (1 + μ/tan α) G_c, if friction is taken to be the same both times."""
+    apparent = [TwoInsertions.of(history, cut).apparent for cut, history in map(blade_twice, (0.0, FRICTION))]
+    assert apparent[0] == pytest.approx(0.2, rel=0.03)
+    assert apparent[1] / apparent[0] == pytest.approx(1 + FRICTION / np.tan(np.radians(20)), rel=0.15)
+
+
+def test_a_planar_crack_takes_its_toughness():
+    cut, history = in_space()
+    pushed = history["depth"] > cut.tip
+    assert recovered_toughness(history, 1.2, 1.8, cut.whole) == pytest.approx(0.15, rel=0.05)
+    sides = history["needle_right_force_x"] + history["needle_left_force_x"]
+    assert np.abs(sides).max() < 1e-4 * history["force"].max()
+    assert np.abs(history["energy_closure"][pushed]).max() < 0.01
+    assert history["imbalance"][pushed].max() < 1e-6
+
+
+@pytest.mark.parametrize("turn", [None, 1.0])
+def test_the_tool_is_where_it_should_be(turn):
+    cut = thread(turn=turn, lc=0.15, H=3.0)
+    path = cut.halves[0].path.position
+    assert path(0.0)[1] == 0 and path(cut.insertion)[1] == pytest.approx(-cut.tip)
+    assert path(cut.time_of(0.9))[1] == pytest.approx(-0.9)
+    with pytest.raises(ValueError, match=r"depth = 0\.1 is not allowed"):
+        cut.time_of(0.1)
+    if turn is None:
+        with pytest.raises(ValueError, match=r"push = 2 is not allowed"):
+            cut.time_of(0.9, 2)
+    else:
+        assert path(cut.time_of(1.4, 2))[1] == pytest.approx(-1.4)
+        with pytest.raises(ValueError, match=r"depth = 1\.4 is not allowed"):
+            cut.time_of(1.4)
+
+
+def test_halves_start_beside_the_plane_of_symmetry():
+    for half, side in zip(split().halves, (1, -1), strict=True):
+        start = half.path.position(0.0)
+        assert side * start[0] < 0 and start[1] == pytest.approx(-0.4)
+        assert half.shape.side == side
+
+
+def test_a_rejected_step_leaves_no_friction_work():
+    cut = thread(friction=FRICTION, lc=0.15, H=3.0, deep=2.0)
+    run(cut.mechanics, cut.time_of(0.6), StepControl.fixed(0.1))
+    before = {part: cut.parts.friction_work(part) for part in ("tip", "shaft")}
+    assert before["tip"] > 0
+    cut.mechanics.begin(cut.time_of(0.7))
+    assert cut.mechanics.solve().converged
+    cut.mechanics.evaluate()
+    assert cut.parts.friction_work("tip") > before["tip"]
+    cut.mechanics.rollback()
+    assert {part: cut.parts.friction_work(part) for part in before} == before
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("build", [thread, planar], ids=["thread", "planar"])
+def test_every_number_of_ranks_gives_the_same_history(build):
+    flat = build is thread
+    coarse = {"lc": 0.15, "H": 2.5, "deep": 1.5} if flat else {"lc": 0.45, "H": 2.5, "deep": 1.6, "growth": 3.0}
+    options = {"friction": FRICTION} if flat else {}
+    runs = [build(comm, **options, **coarse) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)]
+    together, alone = (drive(cut, cut.time_of(1.0), StepControl.fixed(0.1 if flat else 0.2)) for cut in runs)
+    for name in ("force", "tip_force", "shaft_force", "tip_friction_work", "cut", "energy_strain", "work_external"):
+        scale = max(np.abs(alone[name]).max(), 1e-6)
+        assert np.abs(together[name] - alone[name]).max() <= 1e-7 * scale, name
+
+
+def test_parameters_are_refused_by_name():
+    domain = read_geo(MESHES / "thread.geo", MPI.COMM_WORLD, ROUND | {"lc": 0.25}, gdim=2)
+    law = Exponential.from_parameters(strength=0.6, toughness=0.2)
+    needle = Needle(0.5, 0.15, RADIUS)
+    wrong = {"notch": 0.1, "friction": -0.1, "insertion": 0.0, "turn": 0.3}
+    for name, value in wrong.items():
+        with pytest.raises(ValueError, match=f"{name} = {value}"):
+            Insertion.build(domain, NeoHookean(YOUNG, POISSON), law, needle, **({"notch": 0.5} | {name: value}))
+    with pytest.raises(ValueError, match="turn = None is not allowed"):
+        TwoInsertions.of({}, thread(lc=0.25))
+    cut, history = blade_twice(0.0)
+    half = {name: column[:-5] for name, column in history.items()}
+    with pytest.raises(ValueError, match=r"time = .* when the second push ends"):
+        TwoInsertions.of(half, cut)
