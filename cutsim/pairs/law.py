@@ -115,7 +115,10 @@ class PairLaw:
         """
         pressed = False
         if self._laws.penetration is not None:
-            pressure = self._values()["pressure"]
-            mean = np.broadcast_to(self._points.facet_mean(pressure)[:, None], pressure.shape)
+            pressure, met = self._values()["pressure"], self._points.get(self._met)
+            # at an edge a facet is covered in part: points without partner are no part of the mean
+            share = self._points.facet_mean(met)
+            mean = np.divide(self._points.facet_mean(pressure), share, out=np.zeros_like(share), where=share > 0)
+            mean = np.broadcast_to(mean[:, None], pressure.shape)
             pressed = self._history.augment(mean, self._laws.contact.stiffness * self._laws.penetration)
         return (self.slip is not None and self.slip.augment()) or pressed
