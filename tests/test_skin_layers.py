@@ -176,17 +176,18 @@ def test_one_law_makes_one_crack_and_a_notch_saves_its_toughness():
     assert columns["core_fracture"][0] == pytest.approx(0.2 * HARD.toughness[0], rel=5e-3)
 
 
-def sliced(comm, depth=0.5):
+def sliced(comm, depth=0.5, toughness=(0.1, 0.04), width=None):
     """A blade through a stiff layer into a soft one, steps fixed: problem and history."""
-    laws = [Exponential.from_parameters(opening=0.2, toughness=G) for G in (0.1, 0.04)]
+    laws = [Exponential.from_parameters(opening=0.2, toughness=G) for G in toughness]
     layers = [
         Layer("film", 0.3, NeoHookean(1.0, 0.4), laws[0]),
         Layer("base", 0.7, NeoHookean(0.3, 0.4), laws[1]),
     ]
     thicknesses = {layer.name: layer.thickness for layer in layers}
-    domain = laminate(comm, thicknesses, length=1.0, size=0.1, band=0.3, notch=0.2)
+    domain = laminate(comm, thicknesses, length=1.0, size=0.1, band=0.3, notch=0.2, width=width, rows=1)
     block = LayeredBlock.build(layers, domain, damping=0.003)
-    cut, rows = LayeredCut.build(block, Blade(0.3, 0.1, 0.15), notch=0.2, drawn=0.1), []
+    push, lateral = (axis[: domain.mesh.geometry.dim] for axis in ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0)))
+    cut, rows = LayeredCut.build(block, Blade(0.3, 0.1, 0.15, push, lateral), notch=0.2, drawn=0.1), []
 
     def record(report):
         columns = report.columns | cut.columns(report.columns)
@@ -210,6 +211,13 @@ def test_blade_cuts_layers():
     assert rows["film_fracture"][-1] > rows["base_fracture"][-1] > 0
     _, alone = sliced(MPI.COMM_SELF)
     np.testing.assert_allclose(rows["force"], alone["force"], atol=1e-7 * alone["force"].max())
+
+
+def test_a_cut_in_three_dimensions_is_that_of_the_plane():
+    """Held by its front and back a block is in plane strain: the same force per width."""
+    (_, plane), (_, solid) = (sliced(MPI.COMM_SELF, 0.25, (0.05, 0.05), width) for width in (None, 0.3))
+    assert plane["force"][-1] > 1e-3
+    np.testing.assert_allclose(solid["force"] / 0.3, plane["force"], atol=1e-6 * plane["force"].max())
 
 
 def test_a_cut_needs_a_notch():

@@ -21,7 +21,7 @@ Side = Literal["+", "-"]
 class LayeredCut:
     """A blade driven into a notched block of layers along its crack.
 
-    The far ends of the block are held where it goes on, and may be drawn apart first, as skin on a body is.  The block
+    The block is held by its sides, where it goes on; its far ends may be drawn apart first, as skin on a body is.  It
     rests on a smooth plate.  Time is the way of the blade, as in `cutsim.studies.insertion.Insertion`.
 
     Attributes:
@@ -69,7 +69,9 @@ class LayeredCut:
         contacts = tuple(_half(block, blade, crack, tip, insertion, face) for face in FACES for crack in block.cracks)
         plate = Support(block.state, block.domain.facets("bottom"), 1, name="plate")
         ends = [_end(block, f"far_{name}", side * drawn, insertion) for _, side, name in FACES]
-        mechanics = Mechanics(block.state, [*block.terms, *contacts], [plate, *ends])
+        sides = [name for name in ("front", "back") if name in block.domain.names]
+        held = [Support(block.state, block.domain.facets(name), 2) for name in sides]
+        mechanics = Mechanics(block.state, [*block.terms, *contacts], [plate, *ends, *held])
         return cls(block, mechanics, contacts, plate, blade, insertion, tip)
 
     def time_of(self, depth: float) -> float:
