@@ -278,8 +278,11 @@ class Settled:
         self.partial += min(slip.areas()) > 0.1
 
 
-@pytest.mark.mpi
-@pytest.mark.parametrize(("gdim", "slave"), [(2, 0), (2, 1), (3, 1)], ids=["slab", "block", "block in 3-D"])
+@pytest.mark.parametrize(
+    ("gdim", "slave"),
+    [(2, 0), (2, 1), pytest.param(3, 1, marks=pytest.mark.mpi)],
+    ids=["slab", "block", "block in 3-D"],
+)
 def test_from_stick_to_slip_without_penetration(gdim, slave):
     """A block on a rigid slab, either of them the slave: slip from the edges inwards, and μ N in the end."""
     mu, up, h = 0.3, gdim - 1, 0.5 / (4 - gdim)
