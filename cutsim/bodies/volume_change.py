@@ -124,7 +124,8 @@ class _Blocks:
         self._matrix = petsc.create_matrix(self._a)
         ends, columns, _ = self._values()
         starts = ends[rows * cells[:, None] + np.arange(rows)].astype(np.int64)
-        self._entries = starts[..., None] + np.arange(np.diff(ends).max(initial=0))
+        dofmap = a.arguments()[1].ufl_function_space().dofmap
+        self._entries = starts[..., None] + np.arange(dofmap.dof_layout.num_dofs * dofmap.bs)
         self.columns = columns[self._entries[:, 0]].astype(np.int64)
 
     def assemble(self) -> Array:

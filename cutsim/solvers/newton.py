@@ -86,7 +86,7 @@ class NonlinearProblem:
         J: Tangent; derived from F by default.
         petsc_options: PETSc options without prefix. With `pc_type` or `ksp_type` among them no preset is used and
             PETSc does as told; otherwise they refine the preset of `cutsim.solvers.preconditioners.preset_for`, whose
-            preconditioners have the prefixes `direct_`, `bulk_`, `crack_` and `strip_`.
+            preconditioners have the prefixes `direct_`, `bulk_`, `crack_`, `strip_` and `saddle_`.
         entity_maps: Entity maps of the forms.
         jit_options: Override `cutsim.base.compat.JIT_OPTIONS`.
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
