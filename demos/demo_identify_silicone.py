@@ -152,17 +152,20 @@ def inverse(quick: bool, out: Path) -> Fit:
 
 # ## The four silicones
 #
-# Blades cut the four silicones of the thesis with 9 to 10 N over a width of 10.1 mm.  Which toughness does that take in
-# the specimen, 4.2 mm thick and on a plate, with the moduli and strengths of Table 5.1?  Friction was not measured, and
-# it matters as much: the answer is for the friction given.  The force is the largest until the tip is 0.2 mm above the
-# plate.  It grows with the toughness only while the crack runs: with the strength fixed a tougher bond opens further
-# before it breaks, and in the end it gives way like a spring.  Friction of 0.2, about the tangent of the half angle, is
-# taken; with it the softest silicone does not reach 9 N whatever its toughness (8.9 N at most), hence 0.23 there.
+# The machine cut the four silicones of the thesis, 10.1 mm wide, with a load of up to 9 to 10 N.  Which toughness does
+# that take in the specimen, 4.2 mm thick and on a plate, with the moduli and strengths of Table 5.1?  Friction was not
+# measured, and it matters as much: the answer is for the friction given.  The force is the largest until the tip is
+# 0.2 mm above the plate.  It grows with the toughness only while the crack runs: with the strength fixed a tougher bond
+# opens further before it breaks, and in the end it gives way like a spring.  With friction of 0.1 the second silicone,
+# the softest and weakest, stays below 7 N whatever its toughness.  It takes friction of 0.23, more than the tangent of
+# the half angle, so that the blade drags the surface in, and then the force depends on the mesh: the number is no more
+# than an indication.
 
 THIN = BLOCK | {"Lx": 30.0, "H": 4.2}
 FLAT = {True: Specimen(THIN, 4.0, 0.2), False: Specimen(THIN, 4.0, 0.1)}
 WIDTH, FORCE = 10.1, (9.0, 10.0)
-FRICTION = {1: 0.2, 2: 0.23, 3: 0.2, 4: 0.2}
+FRICTION = {1: 0.1, 2: 0.23, 3: 0.1, 4: 0.1}
+BETWEEN = {1: (0.4, 0.8), 2: (0.4, 0.55), 3: (0.4, 0.8), 4: (0.4, 0.8)}  # N/mm
 
 
 def toughness_of(number: int, specimen: Specimen, domain: TaggedMesh) -> tuple[dict[str, float], Curve]:
@@ -177,7 +180,7 @@ def toughness_of(number: int, specimen: Specimen, domain: TaggedMesh) -> tuple[d
         return float(curves[toughness][1].max())
 
     target = float(np.mean(FORCE))
-    found = root_scalar(lambda g: largest(g) - target, x0=0.36, x1=0.4, rtol=5e-3, maxiter=12)
+    found = root_scalar(lambda g: largest(g) - target, bracket=BETWEEN[number], rtol=5e-3, maxiter=12)
     best = min(curves, key=lambda g: abs(curves[g][1].max() - target))
     # a finite difference over steps that the run chooses itself: not too small
     slope = (largest(1.05 * best) - largest(0.95 * best)) / (0.1 * best)
@@ -197,7 +200,7 @@ def toughness_of(number: int, specimen: Specimen, domain: TaggedMesh) -> tuple[d
 
 
 def main(
-    quick: Annotated[bool, typer.Option("--quick", help="shorter cut, second silicone only")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="shorter cut, first silicone only")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/identify_silicone"),
 ) -> None:
     """Identify modulus, Poisson's ratio, toughness and friction of silicones."""
@@ -206,7 +209,7 @@ def main(
     fitted, poisson = tension(out / "tension.csv", solid)
     curve = inverse(quick, out)
     domain = read_geo(MESH, COMM, FLAT[quick].mesh, gdim=2)
-    silicones = {n: toughness_of(n, FLAT[quick], domain) for n in ((2,) if quick else (1, 2, 3, 4))}
+    silicones = {n: toughness_of(n, FLAT[quick], domain) for n in ((1,) if quick else (1, 2, 3, 4))}
     summary = {
         "young": fitted.fit.values["young"],
         "young_interval": list(fitted.fit.intervals()["young"]),
