@@ -73,12 +73,8 @@ class SlipHistory:
         # augmentation leaves no elastic slip that energy is stored in
         self._elastic = law.compliance if tolerance is None else 0.0
         symbolic: FrictionLaw = with_constants(state.mesh, law)
-        n = len(slip)
-        self._memory = points.function(2 * n + 1)
-        memory = [points.at(self._memory)[i] for i in range(2 * n + 1)]
-        closed = _closed(memory[-1], penetration)
-        slid = project(slip - ufl.as_vector(memory[:n]))
-        since = closed * slid + project(ufl.as_vector(memory[n:-1]))
+        self._memory = points.function(2 * len(slip) + 1)
+        slid, closed, since = self._slide(slip, penetration, project)
         self.traction = symbolic.traction(since, pressure, state.dt, temperature)
         size, resistance = (ufl.sqrt(ufl.dot(w, w)) for w in (since, self.traction))
         self._evaluate = points.evaluator(
@@ -95,11 +91,18 @@ class SlipHistory:
             }
         )
         start = self._evaluate()
-        flat = dict.fromkeys(
-            ("advance", "limit", "pressure", "level", "dissipated", "held"), np.zeros_like(points.weights)
-        )
+        none = np.zeros_like(points.weights)
+        flat = dict.fromkeys(("advance", "limit", "pressure", "level", "dissipated", "held"), none)
         self._trial = self._old = {**start, **flat, "traction": np.zeros_like(start["traction"])}
         self._remember(self._old["traction"])
+
+    def _slide(self, slip: Expr, penetration: Expr, project: Callable[[Expr], Expr]) -> tuple[Expr, Expr, Expr]:
+        """Slide of the step, its fraction after closure, and the slip that the law resists."""
+        n = len(slip)
+        memory = [self.points.at(self._memory)[i] for i in range(2 * n + 1)]
+        closed = _closed(memory[-1], penetration)
+        slid = project(slip - ufl.as_vector(memory[:n]))
+        return slid, closed, closed * slid + project(ufl.as_vector(memory[n:-1]))
 
     def evaluate(self) -> None:
         """Slip, dissipation and stored energy of the trial step. Collective.
