@@ -34,6 +34,7 @@ from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHook
 from cutsim.materials.rubbers import MooneyRivlin, Ogden
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
+from cutsim.studies.fracture import JIntegral
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
@@ -339,7 +340,7 @@ def test_pressure_jumps_across_a_crack():
 
 @pytest.mark.parametrize("cell", [QUAD, TRIANGLE])
 def test_double_cantilever_of_a_rubber(cell):
-    """P = 3 E' I δ/(a + χ h)³ of two arms of which one is bent up and the other down.
+    """P = 3 E' I δ/(a + χ h)³ of two arms of which one is bent up and the other down, and J of its front.
 
     χ = 0.673 follows from K = √12 P (a/h + 0.673)/√h (Foote and Buchwald 1985) for every ν, on which the stresses of
     plane strain do not depend.
@@ -362,6 +363,8 @@ def test_double_cantilever_of_a_rubber(cell):
     stiffness = 3 * E / 0.75 / 12 * h**3 / (a + chi * h) ** 3
     assert last["up_force"] == pytest.approx(stiffness * opening, rel=0.005)
     assert last["down_force"] == pytest.approx(-last["up_force"], rel=1e-6)
+    J = JIntegral(solid, (a, 0.0), (1.0, 0.0), 0.3, 0.9)
+    assert J() == pytest.approx(3 * stiffness * opening**2 / (a + chi * h), rel=0.01)
 
 
 RHEOLOGIES = {"elastic": {}, "viscous": {"viscosity": 0.7}, "relaxing": {"relaxation": Prony((0.5,), (0.3,))}}
@@ -453,7 +456,7 @@ def test_rubber_slides_far_on_rubber():
         supports = [*b.drive(0, 0, (0.0, 0.0), "base"), *b.drive(1, 1, path, "top")]
         mechanics = Mechanics(b.state, [*bodies, pair], supports, rtol=1e-10)
         last = final(mechanics, step=0.125)
-        assert pair.pattern > 0
+        assert pair.pattern > 2, "the surfaces have met other facets"
         assert last["base_y_force"] == pytest.approx(-last["top_y_force"], rel=1e-7)
         forces.append([last["top_x_force"], last["top_y_force"]])
     np.testing.assert_allclose(*forces, rtol=0.015)

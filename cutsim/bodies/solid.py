@@ -132,13 +132,20 @@ class Solid(Term):
         """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""
         return self._deformation_gradient(u, self._temperature())
 
+    def energy_parts(self, F: Expr) -> tuple[Expr, Expr]:
+        """Strain energy per reference volume of a deformation gradient, in the parts that `measures` integrate.
+
+        At the present temperature, and with the present pressure of Taylor–Hood elements.
+        """
+        return self._energy(F, self._temperature())
+
     def first_piola(self, u: Expr) -> Expr:
         """First Piola–Kirchhoff stress P = ∂W/∂F with overstresses, 3 × 3 [stress]."""
         F = ufl.variable(self.deformation_gradient(u))
         if self._mixed is not None:
             P = ufl.diff(self._energy(F, None)[0], F) + self._mixed.pressure * cofactor(F)
         else:
-            P = ufl.diff(sum(self._energy(F, self._temperature())), F)
+            P = ufl.diff(sum(self.energy_parts(F)), F)
         return P if self._overstress is None else P + self._overstress.piola(F)
 
     def cauchy_stress(self, u: Expr) -> Expr:
@@ -278,7 +285,7 @@ class Solid(Term):
 
     def _relaxing(self, relaxation: Prony) -> Overstress:
         def energy(F: Expr) -> Expr:
-            return self._energy(F, self._temperature())[0]
+            return self.energy_parts(F)[0]
 
         return Overstress(self.state, relaxation, energy, self.measures[0], self.cells, scale=self.material.young)
 

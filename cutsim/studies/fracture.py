@@ -106,7 +106,7 @@ def _release(solid: Solid, direction: Array, q: fem.Function) -> ufl.Form:
     F = ufl.variable(solid.deformation_gradient(u))
     grad_u = F - ufl.Identity(3)
     total = ufl.Form([])
-    for W, dx in zip(solid.material.energy(F), solid.measures, strict=True):
+    for W, dx in zip(solid.energy_parts(F), solid.measures, strict=True):
         total += (ufl.inner(ufl.diff(W, F), ufl.outer(grad_u * e, grad_q)) - W * ufl.dot(e, grad_q)) * dx
     return total
 
