@@ -1,6 +1,5 @@
 """A deformable body: hyperelastic bulk, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
 
-import logging
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
@@ -19,17 +18,13 @@ from cutsim.base.kinematics import Expr, cofactor, deformation_gradient, green_l
 from cutsim.base.parameters import with_constants
 from cutsim.base.terms import Multiplier, Term
 from cutsim.bodies.pressure import PressureField
+from cutsim.bodies.quadrature import strain_energy_measures
 from cutsim.bodies.volume_change import VolumeChange
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.materials.elastic import Material
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Overstress, Prony
-
-logger = logging.getLogger(__name__)
-
-#: Poisson's ratio from which the volumetric part is integrated with fewer points by default.
-NEARLY_INCOMPRESSIBLE = 0.45
 
 
 class Solid(Term):
@@ -95,7 +90,7 @@ class Solid(Term):
         self._couple(thermoelastic, temperature)
         self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
-        self.measures = self._choose_measures(volumetric)
+        self.measures = strain_energy_measures(state, material, volumetric, cells, name)
         self.assembles = volumetric == "mixed"
         self._mixed = self._projected() if self.assembles else None
         self._pressure = self._continuous() if volumetric == "taylor-hood" else None
@@ -259,29 +254,6 @@ class Solid(Term):
             part.commit()
         if self.temperature is not None:
             self._temperature_seen.x.array[:] = self._temperature_trial
-
-    def _choose_measures(self, volumetric: str) -> tuple[ufl.Measure, ufl.Measure]:
-        element = self.state.V.ufl_element()
-        cell, degree = element.cell_type.name, element.degree
-        simplex = cell in ("triangle", "tetrahedron")
-        # full integration: (degree + 1) points in each direction of a tensor-product cell, exact stiffness on simplices
-        full = 2 * (degree - 1) if simplex else 2 * degree
-        if volumetric == "auto":
-            volumetric = "reduced" if self.material.poisson >= NEARLY_INCOMPRESSIBLE else "full"
-        if self.material.poisson >= NEARLY_INCOMPRESSIBLE and simplex and degree == 1:
-            logger.warning(
-                "%s: a linear %s locks at Poisson's ratio %.3g; use quadrilaterals, hexahedra or degree 2",
-                self.name,
-                cell,
-                self.material.poisson,
-            )
-        # a marker for each rule, hence a kernel for each: FFCx 0.9 mixes the Jacobians of two rules up within a kernel
-        # when one of them has a single point
-        degrees = full, max(full - 2, 1) if volumetric == "reduced" else full
-        first, second = (
-            self.state.measures.cells(self.cells)(metadata={"quadrature_degree": degree}) for degree in degrees
-        )
-        return first, second
 
     def _relaxing(self, relaxation: Prony) -> Overstress:
         def energy(F: Expr) -> Expr:
