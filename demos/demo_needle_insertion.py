@@ -65,8 +65,8 @@ SETTINGS = {
     # (dim, quick)
     (2, False): Setting("thread", THREAD, 15, 0.15, 0.5, 1.0, 0.1, 4.0, 0.1),
     (2, True): Setting("thread", THREAD | dict(H=4, R=4, deep=2.5, lc=0.075), 30, 0.15, 0.5, 1.0, 0.1, 1.6, 0.1),
-    (3, False): Setting("needle", BLOCK, 20, 0.3, 1.0, 0.2, 0.15, 4.5, 0.2),
-    (3, True): Setting("needle", BLOCK | dict(H=5, deep=3, lc=0.3, growth=1.8), 25, 0.4, 1.0, 0.2, 0.15, 1.6, 0.2),
+    (3, False): Setting("needle", BLOCK, 20, 0.3, 1.0, 0.3, 0.15, 4.5, 0.2),
+    (3, True): Setting("needle", BLOCK | dict(H=5, deep=3, lc=0.3, growth=1.8), 25, 0.4, 1.0, 0.3, 0.15, 1.8, 0.2),
 }
 
 Summary = dict[str, float | list[float]]
@@ -75,7 +75,9 @@ History = dict[str, np.ndarray]
 
 def main(
     dim: Annotated[int, typer.Option(min=2, max=3, help="2: body of revolution; 3: planar crack")] = 2,
-    friction: Annotated[float, typer.Option(min=0.0, help="friction coefficient of needle and silicone")] = 0.1,
+    friction: Annotated[
+        float | None, typer.Option(min=0.0, help="of needle and silicone; 0.1 in 2-D, 0 in 3-D by default")
+    ] = None,
     once: Annotated[bool, typer.Option("--once", help="do not draw the needle back and push it again")] = False,
     toughness: Annotated[float | None, typer.Option(help="G_c in N/mm")] = None,
     depth: Annotated[float | None, typer.Option(help="depth of the tip in mm")] = None,
@@ -89,7 +91,8 @@ def main(
     setting = SETTINGS[dim, quick]
     end = depth or setting.depth
     law = Exponential.from_parameters(strength=setting.strength, toughness=toughness or setting.toughness)
-    cut = problem(setting, law, friction, dim, None if once else end)
+    rough = friction if friction is not None else (0.1, 0.0)[dim - 2]
+    cut = problem(setting, law, rough, dim, None if once else end)
     until = cut.time_of(end, 1 if once else 2)
     control = StepControl(first=0.02, largest=0.1, smallest=1e-4)
     with Recording(
@@ -111,7 +114,7 @@ def main(
     write_summary(out / "summary.json", summary, MPI.COMM_WORLD)
     if MPI.COMM_WORLD.rank == 0:
         plot(out, cut, history, parts)
-    check(summary)
+    check(summary, long=dim == 2 or not quick)
 
 
 def problem(setting: Setting, law: Exponential, friction: float, dim: int, turn: float | None) -> Insertion:
@@ -215,16 +218,17 @@ def draw(cut: Insertion, out: Path) -> None:
 
 
 # With friction the two insertions differ by more than the new surface: what pushes the faces of the crack apart presses
-# on the tip, and so rubs on it, in the first insertion only.  The audit knows that work.
+# on the tip, and so rubs on it, in the first insertion only.  The audit knows that work.  What is left is the toughness
+# if the crack is long against its process zone.
 
 
-def check(summary: Summary) -> None:
+def check(summary: Summary, *, long: bool) -> None:
     """The headline numbers, asserted."""
     names = ("deformation", "cutting", "tip_friction", "shaft_friction", "viscosity")
     total = sum(summary[f"{name}_at_the_end"] for name in names)
     assert abs(total / summary["force_at_the_end"] - 1) < 0.02
     assert summary["largest_closure"] < 0.02
-    if "toughness_of_two_insertions" in summary:
+    if long and "toughness_of_two_insertions" in summary:
         assert abs(summary["toughness_of_two_insertions"] / summary["toughness_given"] - 1) < 0.05
 
 

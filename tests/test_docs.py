@@ -76,6 +76,15 @@ def test_large_sliding():
     assert page["cutting"].terms[1].name == "wedge"
 
 
+def test_needle_insertion(monkeypatch):
+    monkeypatch.chdir(DOCS.parent)
+    page = run_page("needle_insertion")
+    assert page["both"].toughness == pytest.approx(0.1, rel=0.08), "on the coarse mesh of the page"
+    assert page["both"].apparent > 1.2 * page["both"].toughness, "the page says that friction adds to it"
+    names = ("deformation", "cutting", "tip friction", "shaft friction", "viscosity")
+    assert sum(page["parts"][name][-1] for name in names) == pytest.approx(page["parts"]["force"][-1], rel=0.02)
+
+
 def test_skin_layers():
     page = run_page("skin_layers")
     last = {name: value for name, (value, _) in page["rows"][-1].items()}

@@ -13,8 +13,8 @@ from mpi4py import MPI
 
 from cutsim.fields.space import cracked_space
 from cutsim.results import pictures, plots
-from cutsim.results.pictures import draw_body, gather_facets, gather_grid
-from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.pictures import draw_body, gather_facets, gather_grid, revolved
+from cutsim.results.plots import COLOURS, Curve, plot_curves, plot_energy, plot_parts
 
 SHAPES = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
 
@@ -168,3 +168,21 @@ def test_curves_and_energy_are_plotted(tmp_path):
     assert shares[0] / shares[1] == pytest.approx(1.5, rel=0.1)  # areas are in the ratio of the energies
     with pytest.raises(ValueError, match="energy_closure"):
         plot_energy(tmp_path / "energy.png", history)
+
+
+def test_parts_are_stacked_in_colours_of_their_own(tmp_path):
+    x = np.linspace(0, 1, 20)
+    parts = {"a": 0.6 * x, "none": 0 * x, "b": 0.4 * x}
+    plot_parts(tmp_path / "parts.png", x, parts, x, xlabel="depth [mm]", ylabel="force [N]")
+    pixels = colours(tmp_path / "parts.png")[0]
+    shown = [0.85 * np.array(matplotlib.colors.to_rgb(COLOURS[i])) + 0.15 for i in (0, 1, 2)]
+    shares = [np.mean(np.abs(pixels - colour).max(axis=2) < 0.02) for colour in shown]
+    assert shares[0] / shares[2] == pytest.approx(1.5, rel=0.1)
+    assert shares[1] == 0
+
+
+def test_tool_of_revolution_has_the_area_of_a_cone_and_a_cylinder():
+    outline = np.array([(0.0, 0.0), (3.0, 4.0), (3.0, 9.0), (-3.0, 9.0), (-3.0, 4.0)])
+    tool = revolved(outline, (1.0, 2.0, 3.0), ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0)), points=400)
+    assert tool.area == pytest.approx(np.pi * 3 * 5 + 2 * np.pi * 3 * 5, rel=1e-3)
+    np.testing.assert_allclose(tool.bounds, (-2, 4, 2, 11, 0, 6), atol=1e-3)

@@ -138,17 +138,19 @@ def plot_parts(
     Args:
         path: The file; its suffix tells the format. Folders are made.
         x: Abscissae.
-        parts: Label -> ordinates of a part >= 0, from the bottom upwards; parts that vanish are left out.
+        parts: Label -> ordinates of a part >= 0, seven at most, from the bottom upwards; what vanishes is left out.
         total: The quantity itself, drawn as a line.
         xlabel: Text at the abscissa, with the unit.
         ylabel: Text at the ordinate and in the legend, with the unit.
         title: Text above the plot.
     """
-    shown = {label: part for label, part in parts.items() if np.any(part)}
+    colours = dict(zip(parts, COLOURS, strict=False))
+    shown = [label for label, part in parts.items() if np.any(part)]
     with matplotlib.rc_context(_style()):
         figure = Figure()
         axes = figure.add_subplot(xlabel=xlabel, ylabel=ylabel, title=title)
-        axes.stackplot(x, *shown.values(), labels=shown.keys(), colors=COLOURS, alpha=0.85)
+        stack = [parts[label] for label in shown]
+        axes.stackplot(x, *stack, labels=shown, colors=[colours[label] for label in shown], alpha=0.85)
         axes.plot(x, total, color="black", label="in all")
         handles, texts = axes.get_legend_handles_labels()
         axes.legend(handles[::-1], texts[::-1], loc="upper left")
