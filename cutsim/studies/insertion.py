@@ -144,6 +144,8 @@ class Insertion:
         require("friction", friction, friction >= 0, ">= 0")
         require("insertion", insertion, insertion > 0, "> 0")
         require("turn", turn, turn is None or turn > tip, f"> {tip}, where the push begins, or None")
+        require("tool.side", tool.side, tool.side == 0, "0, the whole tool")
+        require("tool.push", tool.push, tool.push[1] == -1, "along −y")
         mesh, revolved = domain.mesh, isinstance(tool, Needle) and domain.mesh.geometry.dim == 2
         state = State(cracked_space(mesh, ("Lagrange", 1, (mesh.geometry.dim,)), _slit(domain)), axisymmetric=revolved)
         solid = Solid(state, material, name="block", viscosity=viscosity)
@@ -189,11 +191,11 @@ class Insertion:
         return self.insertion + back + depth - self.tip
 
     def heated(self, thermal: ThermalCut, initial: float) -> ThermoMechanics:
-        """The cut with heat from friction on the blade and from fracture; the block is insulated elsewhere. Collective.
+        """The cut with heat from friction on the tool and from fracture; the block is insulated elsewhere. Collective.
 
         Args:
             thermal: Thermal properties.
-            initial: Initial temperature of block and blade [K].
+            initial: Initial temperature of block and tool [K].
 
         Returns:
             The coupled problem, to run in place of `mechanics`.

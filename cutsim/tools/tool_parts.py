@@ -13,7 +13,8 @@ from cutsim.tools.tool_contact import Patch, ToolContact
 #: Parts of a tool, from its foremost point upwards.
 PARTS = ("tip", "shaft")
 
-_Values = dict[str, float]
+_QUANTITIES = ("force", "friction", "work")
+_Books = dict[tuple[str, str], float]
 
 
 class ToolParts(Term):
@@ -32,8 +33,8 @@ class ToolParts(Term):
         self.name = name
         self._shaft = shape.shaft_height
         self._books = [(patch, _evaluator(patch, shape)) for tool in tools for patch in tool.patches]
-        self._forces: dict[str, _Values] = {kind: dict.fromkeys(PARTS, 0.0) for kind in ("force", "friction")}
-        self._work = self._work_old = dict.fromkeys(PARTS, 0.0)
+        self._trial: _Books = {(quantity, part): 0.0 for quantity in _QUANTITIES for part in PARTS}
+        self._old = self._trial
 
     def residual(self, v: Expr) -> ufl.Form:
         """Nothing."""
@@ -41,35 +42,37 @@ class ToolParts(Term):
 
     def evaluate(self) -> None:
         """Forces of the trial state and work up to it. Collective."""
-        self._forces = {kind: dict.fromkeys(PARTS, 0.0) for kind in ("force", "friction")}
-        self._work = dict(self._work_old)
+        self._trial = {key: self._old[key] if key[0] == "work" else 0.0 for key in self._old}
         for patch, evaluate in self._books:
             now, points = evaluate(), patch.surface.points
+            densities = {
+                "force": now["pressure"] + now["friction"],
+                "friction": now["friction"],
+                "work": patch.dissipation(),
+            }
             beside = {"tip": now["height"] < self._shaft, "shaft": now["height"] >= self._shaft}
-            for part, here in beside.items():
-                self._forces["force"][part] += points.integral(here * (now["pressure"] + now["friction"]))
-                self._forces["friction"][part] += points.integral(here * now["friction"])
-                self._work[part] += points.integral(here * patch.dissipation())
+            for quantity, part in self._trial:
+                self._trial[quantity, part] += points.integral(beside[part] * densities[quantity])
 
     def force(self, part: str) -> float:
         """Force on a part against the direction of push, pressure and friction, in the trial state [force]."""
-        return self._forces["force"][part]
+        return self._trial["force", part]
 
     def friction(self, part: str) -> float:
         """What friction has in it [force]."""
-        return self._forces["friction"][part]
+        return self._trial["friction", part]
 
     def friction_work(self, part: str) -> float:
         """Friction work on a part up to the trial state [energy]."""
-        return self._work[part]
+        return self._trial["work", part]
 
     def rollback(self) -> None:
-        """Forget the work of the trial step."""
-        self._work = self._work_old
+        """Back to the forces and the work of the committed state."""
+        self._trial = self._old
 
     def commit(self) -> None:
-        """Adopt the work of the step."""
-        self._work_old = self._work
+        """Adopt the trial step."""
+        self._old = self._trial
 
 
 def _evaluator(patch: Patch, shape: Pointed) -> Callable[[], dict[str, Values]]:
