@@ -175,8 +175,31 @@ class Exponential:
         )
 
 
+class ByToughness:
+    """What a law has whose parameters are a strength and a toughness in each mode."""
+
+    t_n: float
+    G_I: float
+    G_II: float
+
+    @property
+    def strength(self) -> float:
+        """Largest normal traction t_n [stress]."""
+        return self.t_n
+
+    @property
+    def opening(self) -> float:
+        """Normal opening G_I/(e t_n) of the exponential law with the same strength and toughness [length]."""
+        return self.G_I / (e * self.t_n)
+
+    @property
+    def toughness(self) -> tuple[float, float]:
+        """Works of separation (G_I, G_II) [force/length]."""
+        return self.G_I, self.G_II
+
+
 @dataclass(frozen=True)
-class Bilinear:
+class Bilinear(ByToughness):
     """Bilinear mixed-mode law with the Benzeggagh–Kenane criterion (Camanho, Turon et al. 2006).
 
     T = (1 − d) K δ with d the largest value so far of λ_f (λ − λ_0) / (λ (λ_f − λ_0)), λ the norm of the jump,
@@ -221,21 +244,6 @@ class Bilinear:
         """
         require("rise", rise, 0 < rise < 1, "in (0, 1)")
         return cls(max(t_n**2 / (2 * G_I), t_t**2 / (2 * G_II)) / rise, t_n, G_I, t_t, G_II, eta)
-
-    @property
-    def strength(self) -> float:
-        """Largest normal traction t_n [stress]."""
-        return self.t_n
-
-    @property
-    def opening(self) -> float:
-        """Normal opening G_I/(e t_n) of the exponential law with the same strength and toughness [length]."""
-        return self.G_I / (e * self.t_n)
-
-    @property
-    def toughness(self) -> tuple[float, float]:
-        """Works of separation (G_I, G_II) [force/length]."""
-        return self.G_I, self.G_II
 
     def demand(self, opening: Expr, sliding: Expr) -> Expr:
         """Damage d that this jump alone would cause, in [0, 1]."""

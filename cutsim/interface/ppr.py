@@ -1,16 +1,16 @@
 """The cohesive law of Park, Paulino and Roesler (2009): shapes, strengths and toughnesses of both modes at will."""
 
 from dataclasses import dataclass
-from math import e
 
 import ufl
 
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr, positive_part
+from cutsim.interface.cohesive import ByToughness
 
 
 @dataclass(frozen=True)
-class ParkPaulinoRoesler:
+class ParkPaulinoRoesler(ByToughness):
     """Law with the potential Ψ of Park, Paulino and Roesler (J. Mech. Phys. Solids 57, 2009), often called PPR.
 
     With x = δ_n/δ_nc, y = δ_t/δ_tc, f(x) = (1−x)^α (1 + αx/m)^m, g(y) = (1−y)^β (1 + βy/n)^n and Φ = max(φ_n, φ_t),
@@ -50,25 +50,10 @@ class ParkPaulinoRoesler:
             require(peak, place, 0 < place < shape**-0.5, f"in (0, 1/sqrt({name}) = {shape**-0.5:g})")
 
     @property
-    def strength(self) -> float:
-        """Largest normal traction t_n [stress]."""
-        return self.t_n
-
-    @property
     def final(self) -> tuple[float, float]:
         """Opening δ_nc and sliding δ_tc at which the bond is broken in each pure mode [length]."""
         normal = _slope(self.peak_n, self.alpha, self.peak_n) * self.G_I / self.t_n
         return normal, _slope(self.peak_t, self.beta, self.peak_t) * self.G_II / self.t_t
-
-    @property
-    def opening(self) -> float:
-        """Normal opening G_I/(e t_n) of the exponential law with the same strength and toughness [length]."""
-        return self.G_I / (e * self.t_n)
-
-    @property
-    def toughness(self) -> tuple[float, float]:
-        """Works of separation (φ_n, φ_t) in the pure modes [force/length]."""
-        return self.G_I, self.G_II
 
     def demand(self, opening: Expr, sliding: Expr) -> Expr:
         """Effective jump √(⟨δ_n⟩² + β² δ_t²) with β² = φ_t/φ_n (thesis 4.22)."""
