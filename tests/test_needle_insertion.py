@@ -186,6 +186,19 @@ def test_the_tool_is_where_it_should_be(turn):
             cut.time_of(1.4)
 
 
+def test_groups_of_the_meshes_have_their_areas():
+    cut, whole = thread(lc=0.2), planar(lc=0.45)
+    areas = [c.points.integral(np.ones_like(c.points.weights)) for c in (cut.crack, whole.crack)]
+    assert areas[0] == pytest.approx(2 * np.pi * THREAD * (ROUND["H"] - ROUND["notch"]))
+    assert areas[1] == pytest.approx(BLOCK["H"] * BLOCK["B"] - BLOCK["notch"] * BLOCK["slit"])
+    mouth = cut.halves[0].patches[2].surface.points
+    cone = np.pi * (2 * THREAD + 0.1) * np.hypot(0.1, ROUND["notch"])
+    assert mouth.integral(np.ones_like(mouth.weights)) == pytest.approx(cone)
+    for name, sizes, wrong in (("thread", ROUND, "notch"), ("thread", ROUND, "r0"), ("needle", BLOCK, "slit")):
+        with pytest.raises(ValueError, match=f"{wrong} = 9"):
+            read_geo(MESHES / f"{name}.geo", MPI.COMM_WORLD, sizes | {wrong: 9.0}, gdim=2)
+
+
 def test_halves_start_beside_the_plane_of_symmetry():
     for half, side in zip(split().halves, (1, -1), strict=True):
         start = half.path.position(0.0)
