@@ -33,10 +33,12 @@ from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
 from cutsim.tools.tool_contact import ToolContact
+from cutsim.tools.tool_parts import ToolParts
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation
 
@@ -65,6 +67,7 @@ __all__ = [
     "HeatBody",
     "HeatFlux",
     "HeatTransfer",
+    "Insertion",
     "InterfaceHeat",
     "IsochoricNeoHookean",
     "Layer",
@@ -102,6 +105,7 @@ __all__ = [
     "ThermoMechanics",
     "ToolContact",
     "ToolHeat",
+    "ToolParts",
     "Traction",
     "TransverselyIsotropic",
     "TriangulatedTool",
