@@ -42,7 +42,7 @@ from cutsim.tools.tool_parts import ToolParts
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "AdiabaticTool",
