@@ -126,6 +126,11 @@ def test_the_parts_of_the_force_are_those_of_the_audit():
     assert np.diff(parts["shaft friction"][late]).min() > 0, "more and more of the shaft is in the body"
     np.testing.assert_allclose(parts["cutting"][-2:], 2 * np.pi * THREAD * TOUGHNESS, rtol=0.05)
     assert not parts["shaft friction"][parts["depth"] < 0.6].any(), "the shaft begins higher up"
+    _, history = blade_twice(0.0)
+    parts = force_parts(history, 1.0, 0.2)
+    whole = np.sum([parts[n] for n in names], axis=0)
+    # from the first window on: what spreads the halves apart before the push is no part of its force
+    np.testing.assert_allclose(whole, parts["force"], atol=0.04 * parts["force"].max())
     with pytest.raises(ValueError, match=r"window = 2\.0 is not allowed"):
         force_parts(history, 1.0, 2.0)
 

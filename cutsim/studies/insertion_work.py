@@ -137,5 +137,6 @@ class TwoInsertions:
 
 
 def _first_push(depth: Array) -> NDArray[np.intp]:
-    """Rows in which the tool is deeper than ever before."""
-    return np.flatnonzero(np.diff(np.maximum.accumulate(depth), prepend=-np.inf) > 0)
+    """Rows of the first push: the last one before it, then those in which the tool is deeper than ever before."""
+    before = np.flatnonzero(np.diff(np.maximum.accumulate(depth)) > 0)
+    return np.concatenate([before[:1], before + 1])
