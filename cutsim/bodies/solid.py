@@ -22,7 +22,7 @@ from cutsim.bodies.quadrature import strain_energy_measures
 from cutsim.bodies.volume_change import VolumeChange
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
-from cutsim.materials.elastic import Material
+from cutsim.materials.elastic import Material, volumetric_energy
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Overstress, Prony
 
@@ -160,9 +160,9 @@ class Solid(Term):
             J = ufl.det(self.deformation_gradient(u))
             work += self._mixed.pressure * ufl.derivative(J, u, v) * self.measures[0]
         if self.viscosity:
-            E, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
-            rate = (E - old) / self.state.dt
-            work += self._viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
+            E, change = self._strain()
+            rate = change / self.state.dt
+            work += self._viscosity * ufl.inner(rate, ufl.derivative(E, u, v)) * self.measures[0]
         if self._overstress is not None:
             work += self._overstress.residual(v)
         return work
@@ -284,7 +284,7 @@ class Solid(Term):
         return factor * stretch**3 * shear, stretch**3 * volumetric
 
     def _parts(self, u: Expr, T: Expr | None) -> tuple[Expr, Expr]:
-        """Both parts of the strain energy per reference volume ; mixed elements know that of the state only."""
+        """Both parts of the strain energy per reference volume; mixed elements know that of the state only."""
         shear, volumetric = self._energy(self._deformation_gradient(u, T), T)
         return shear, volumetric if self._mixed is None else self._volumetric(self._mixed.value)
 
@@ -324,12 +324,17 @@ class Solid(Term):
         return 0.5 * total
 
     def _viscous_work(self) -> ufl.Form:
+        _, change = self._strain()
+        return self._viscosity / self.state.dt * ufl.inner(change, change) * self.measures[0]
+
+    def _strain(self) -> tuple[Expr, Expr]:
+        """Green–Lagrange strain, and its change in the step."""
         new, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
-        return self._viscosity / self.state.dt * ufl.inner(new - old, new - old) * self.measures[0]
+        return new, new - old
 
 
 def _by_volume(material: Material) -> bool:
     """Whether the volumetric part is a function of det F: a stretch and a growth of the same volume tell."""
     stretch, growth = np.diag([2.0, 1.0, 1.0]), 2 ** (1 / 3) * np.eye(3)
-    first, second = (float(material.energy(ufl.as_matrix(F.tolist()))[1](())) for F in (stretch, growth))
+    first, second = (volumetric_energy(material, F) for F in (stretch, growth))
     return abs(first - second) < 1e-9 * abs(first)

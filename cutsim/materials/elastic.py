@@ -8,7 +8,9 @@ do not lock.  P = ∂W/∂F and the tangent are derived by UFL.
 from dataclasses import dataclass
 from typing import Protocol, Self, runtime_checkable
 
+import numpy as np
 import ufl
+from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr, green_lagrange, small_strain
@@ -41,6 +43,11 @@ def isochoric_invariant(F: Expr) -> Expr:
 def engineering_constants(shear: float, bulk: float) -> tuple[float, float]:
     """Young's modulus [stress] and Poisson's ratio [–] of shear and bulk modulus."""
     return 9 * bulk * shear / (3 * bulk + shear), (3 * bulk - 2 * shear) / (2 * (3 * bulk + shear))
+
+
+def volumetric_energy(material: Material, F: NDArray[np.float64]) -> float:
+    """Volumetric part of the strain energy of a deformation gradient, 3 × 3 numbers [energy/length³]."""
+    return float(material.energy(ufl.as_matrix(F.tolist()))[1](()))
 
 
 class WithoutPlaneStress:

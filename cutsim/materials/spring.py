@@ -24,6 +24,18 @@ _HALVINGS = 12
 _TOLERANCE = 1e-11
 
 
+def symmetric_tensor(components: Expr, pairs: Sequence[tuple[int, int]]) -> Expr:
+    """The symmetric tensor, 3 × 3, of its components.
+
+    Args:
+        components: A vector that begins with the components.
+        pairs: Row and column of each, the row not below the column; the others are zero.
+    """
+    order = {pair: k for k, pair in enumerate(pairs)}
+    places = [[order.get((min(i, j), max(i, j))) for j in range(3)] for i in range(3)]
+    return ufl.as_matrix([[0 if k is None else components[k] for k in row] for row in places])
+
+
 class Spring:
     """A strain energy as a function of strain, and the strain that belongs to a stress, at the points of cells.
 
@@ -63,7 +75,7 @@ class Spring:
         self._dofs = space.dofmap.list[cells]
         self._strain = fem.Function(space)
         y = ufl.variable(self._strain)
-        C = self._right_cauchy_green(y)
+        C = ufl.Identity(3) + 2 * symmetric_tensor(y, pairs)
         W = energy(_cholesky(C))
         self._energy = expression(W, points, mesh)
         self._isochoric = self._ignores_volume()
@@ -156,11 +168,6 @@ class Spring:
         self._strain.x.array.reshape(-1, len(self._order) + 1)[self._dofs] = y
         size = int(np.prod(compiled.ufl_expression.ufl_shape))
         return np.array(compiled.eval(self._mesh, self.cells)).reshape(*self._dofs.shape, size)
-
-    def _right_cauchy_green(self, strain: Expr) -> Expr:
-        rows = [[self._order.get((min(i, j), max(i, j))) for j in range(3)] for i in range(3)]
-        E = ufl.as_matrix([[0 if k is None else strain[k] for k in row] for row in rows])
-        return ufl.Identity(3) + 2 * E
 
 
 def _cholesky(C: Expr) -> Expr:

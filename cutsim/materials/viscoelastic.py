@@ -27,7 +27,7 @@ from cutsim.base.compat import expression
 from cutsim.base.kinematics import Expr, green_lagrange
 from cutsim.fields.state import State
 from cutsim.materials.maxwell import Maxwell
-from cutsim.materials.spring import Spring
+from cutsim.materials.spring import Spring, symmetric_tensor
 
 Array = NDArray[np.float64]
 
@@ -125,14 +125,14 @@ class Overstress:
         u = self._state.u
         F = self._state.deformation_gradient(u)
         changing = ufl.derivative(self._weight * self._energy(F) * self._dx, u, v)
-        return changing + ufl.inner(F * self._tensor(self._known), ufl.derivative(F, u, v)) * self._dx
+        return changing + ufl.inner(F * symmetric_tensor(self._known, self._pairs), ufl.derivative(F, u, v)) * self._dx
 
     def piola(self, F: Expr) -> Expr:
         """First Piola–Kirchhoff stress of the overstresses at the end of the step, 3 × 3 [stress].
 
         What is left of earlier steps is known at the integration points, and enters by its mean over each cell.
         """
-        return F * (self._weight * self._stress(F) + self._tensor(self._means))
+        return F * (self._weight * self._stress(F) + symmetric_tensor(self._means, self._pairs))
 
     def begin(self) -> None:
         """Factors of the step whose size the state knows."""
@@ -179,9 +179,3 @@ class Overstress:
         """Second Piola–Kirchhoff stress S of the energy that relaxes, 3 × 3."""
         F = ufl.variable(F)
         return ufl.inv(F) * ufl.diff(self._energy(F), F)
-
-    def _tensor(self, f: fem.Function) -> Expr:
-        """The symmetric tensor of components, 3 × 3."""
-        order = {pair: k for k, pair in enumerate(self._pairs)}
-        places = [[order.get((min(i, j), max(i, j))) for j in range(3)] for i in range(3)]
-        return ufl.as_matrix([[0 if k is None else f[k] for k in row] for row in places])
