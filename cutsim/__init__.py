@@ -1,5 +1,7 @@
 """cutsim: cutting, tearing and blade penetration of soft solids on FEniCSx."""
 
+import mpi4py.MPI  # noqa: F401  # first: the wheels of dolfinx and petsc4py need the library that it loads
+
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
 from cutsim.analysis.stepping import StepControl, StepError, StepReport, run

@@ -44,7 +44,6 @@ from typing import Annotated
 import basix
 import numpy as np
 import typer
-from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim import (
@@ -61,7 +60,7 @@ from cutsim import (
     read_geo,
     run,
 )
-from cutsim.base.compat import JIT_OPTIONS, jit_cache
+from cutsim.base.compat import evaluate, expression
 from cutsim.results.output import write_summary
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid
 from cutsim.results.plots import Curve, plot_curves, plot_energy
@@ -275,11 +274,10 @@ def secants(specimen: Specimen, history: dict[str, np.ndarray]) -> dict[str, flo
 def extreme_bending(beam: Beam) -> np.ndarray:
     """Largest stress along the beam at the corners of each owned cell. Collective."""
     mesh = beam.state.mesh
-    with jit_cache(mesh.comm):
-        corners = basix.geometry(mesh.basix_cell())
-        stress = fem.Expression(beam.solid.cauchy_stress(beam.state.u)[0, 0], corners, jit_options=JIT_OPTIONS)
+    corners = basix.geometry(mesh.basix_cell())
+    stress = expression(beam.solid.cauchy_stress(beam.state.u)[0, 0], corners, mesh)
     cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
-    return stress.eval(mesh, cells).max(axis=1)
+    return evaluate(stress, mesh, cells).max(axis=1)
 
 
 def draw(beam: Beam, recording: Recording, out: Path, title: str) -> None:

@@ -60,7 +60,7 @@ from cutsim import (
     read_geo,
     run,
 )
-from cutsim.base.compat import expression
+from cutsim.base.compat import nodal_expression
 from cutsim.results.output import write_summary
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid
 from cutsim.results.plots import Curve, plot_curves, plot_energy
@@ -303,7 +303,7 @@ def draw(beam: Beam, history: dict[str, np.ndarray], out: Path, title: str) -> N
     space = fem.functionspace(beam.state.mesh, ("DG", 0))
     stress = fem.Function(space)
     axial = beam.solid.cauchy_stress(beam.state.u)[0, 0]
-    stress.interpolate(expression(axial, space.element.interpolation_points(), beam.state.mesh))
+    stress.interpolate(nodal_expression(axial, space))
     body = gather_grid(beam.state.u, {"stress": stress})
     crack = gather_facets(beam.state.u, beam.bond.points.facets, beam.bond.facet_mean("damage"))
     scale = 10.0

@@ -63,7 +63,7 @@ from cutsim import (
     run,
 )
 from cutsim import Path as ToolPath
-from cutsim.base.compat import expression
+from cutsim.base.compat import geometry_nodes, nodal_expression
 from cutsim.fields.points import FacetPoints, Surface, Values
 from cutsim.results.output import write_summary
 from cutsim.results.pictures import draw_body, gather_grid
@@ -210,7 +210,7 @@ class Indentation:
 def round_off(domain: TaggedMesh, specimen: Specimen) -> None:
     """Raise the face of the upper block to that of a ball, which levels off outside of the core."""
     x, R = domain.mesh.geometry.x, specimen.radius
-    nodes = np.unique(domain.mesh.geometry.dofmap[domain.cells("upper")])
+    nodes = np.unique(geometry_nodes(domain.mesh)[domain.cells("upper")])
     r, rim = np.hypot(x[nodes, 0], x[nodes, 1]), 1.5 * specimen.core
     inside = np.minimum(r, rim)
     slope = rim / np.sqrt(R**2 - rim**2)
@@ -399,7 +399,7 @@ def draw(problem: Indentation, out: Path) -> None:
     stress = fem.Function(space)
     deviator = ufl.dev(problem.solid.cauchy_stress(state.u))
     mises = ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-    stress.interpolate(expression(mises, space.element.interpolation_points(), state.mesh))
+    stress.interpolate(nodal_expression(mises, space))
     body = gather_grid(state.u, {"stress": stress})
     if body is not None:
         body = body.extract_cells(np.abs(body.cell_centers().points).max(axis=1) < 3 * specimen.core)

@@ -36,7 +36,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim import Coulomb, Mechanics, NeoHookean, Solid, State, StepControl, Support, SurfacePair, read_geo, run
-from cutsim.base.compat import expression
+from cutsim.base.compat import nodal_expression
 from cutsim.results.output import write_summary
 from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves
@@ -178,8 +178,7 @@ def draw(bodies: Bodies, path: Path, title: str) -> None:
     stress = fem.Function(space)
     for solid in bodies.solids:
         vertical = solid.cauchy_stress(bodies.state.u)[1, 1]
-        points = space.element.interpolation_points()
-        stress.interpolate(expression(vertical, points, bodies.state.mesh), solid.cells)
+        stress.interpolate(nodal_expression(vertical, space), solid.cells)
     body = gather_grid(bodies.state.u, {"stress": stress})
     draw_body(path, body, "stress", label="vertical stress [MPa]", title=title)
 

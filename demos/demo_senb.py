@@ -42,6 +42,7 @@ from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, StepReport, run
+from cutsim.base.compat import nodal_expression
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh, read_geo
@@ -399,7 +400,7 @@ def axial_stress(solid: Solid) -> fem.Function:
     """Axial stress in the middle of each cell."""
     space = fem.functionspace(solid.state.mesh, ("DG", 0))
     stress = fem.Function(space)
-    stress.interpolate(fem.Expression(solid.cauchy_stress(solid.state.u)[0, 0], space.element.interpolation_points()))
+    stress.interpolate(nodal_expression(solid.cauchy_stress(solid.state.u)[0, 0], space))
     return stress
 
 

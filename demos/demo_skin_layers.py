@@ -39,7 +39,7 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from cutsim import Blade, Exponential, LayeredBlock, StepControl, laminate, run
-from cutsim.base.compat import expression
+from cutsim.base.compat import nodal_expression
 from cutsim.results.output import write_summary
 from cutsim.results.pictures import draw_body, gather_grid, prism
 from cutsim.results.plots import Curve, plot_curves, plot_energy
@@ -188,7 +188,7 @@ def draw(cut: LayeredCut, history: History, out: Path) -> None:
     for i, solid in enumerate(block.solids, start=1):
         deviator = ufl.dev(solid.cauchy_stress(block.state.u))
         mises = 1e3 * ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-        stress.interpolate(expression(mises, space.element.interpolation_points(), space.mesh), solid.cells)
+        stress.interpolate(nodal_expression(mises, space), solid.cells)
         number.x.array[space.dofmap.list[solid.cells, 0]] = i
     grid = gather_grid(block.state.u, {"layer": number, "stress": stress})
     tip = np.asarray(cut.contacts[0].position.value)

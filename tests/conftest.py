@@ -7,6 +7,7 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from cutsim.analysis.stepping import run
+from cutsim.base.compat import cell_partitioner
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.space import cracked_space
@@ -66,7 +67,7 @@ class Blocks:
 
 def make_blocks(gdim=2, n=2, comm=MPI.COMM_WORLD, cell=None):
     """Two glued blocks of n × n/2 (× n) cells."""
-    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+    partitioner = cell_partitioner()
     quads = (mesh.CellType.quadrilateral, mesh.CellType.hexahedron)
     create = (mesh.create_unit_square, mesh.create_unit_cube)[gdim - 2]
     domain = create(comm, *(n,) * gdim, cell or quads[gdim - 2], partitioner=partitioner)

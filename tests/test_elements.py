@@ -15,7 +15,7 @@ from test_tangents import assert_slope_two, jump_part, smooth
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, run
 from cutsim.base.assembly import integrate
-from cutsim.base.compat import form
+from cutsim.base.compat import cell_partitioner, form
 from cutsim.bodies.loads import Pressure, Support, Traction
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
@@ -42,7 +42,7 @@ HALF_TURN = np.pi / 2
 
 
 def rectangle(corners, n, cell=QUAD, comm=MPI.COMM_WORLD):
-    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+    partitioner = cell_partitioner()
     return mesh.create_rectangle(comm, corners, n, cell, partitioner=partitioner)
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from dolfinx import mesh
-from dolfinx.mesh import CellType, GhostMode
+from dolfinx.mesh import CellType
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, run
 from cutsim.base.assembly import integrate
-from cutsim.base.compat import form
+from cutsim.base.compat import cell_partitioner, form
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.space import cracked_space
@@ -26,7 +26,7 @@ from cutsim.studies.fracture import (
     stress_intensity,
 )
 
-PARTITIONER = mesh.create_cell_partitioner(GhostMode.shared_facet)
+PARTITIONER = cell_partitioner()
 
 
 def rectangle(length, half_height, nx, ny):

@@ -7,6 +7,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.compat import cell_partitioner
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
@@ -24,7 +25,7 @@ class Bar:
     """A rectangle, the first axis being its length, with heat in it."""
 
     def __init__(self, cells=(4, 1), size=(1.0, 1.0), initial=300.0, degree=1, **options):
-        partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+        partitioner = cell_partitioner()
         corners = [(0.0, 0.0), size]
         quads = mesh.CellType.quadrilateral
         domain = mesh.create_rectangle(MPI.COMM_WORLD, corners, cells, quads, partitioner=partitioner)

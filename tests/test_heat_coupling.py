@@ -12,6 +12,7 @@ from test_tangents import assert_slope_two, smooth
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
 from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.compat import cell_partitioner
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.space import cracked_space
@@ -40,7 +41,7 @@ class HotCube:
     """The unit square or cube, warmed evenly from 300 in unit time, resting on planes through the origin."""
 
     def __init__(self, material, law, gdim=3, rise=RISE, plane="strain", supports=(), iterate=1e-9):
-        partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+        partitioner = cell_partitioner()
         create = (mesh.create_unit_square, mesh.create_unit_cube)[gdim - 2]
         kind = (mesh.CellType.quadrilateral, mesh.CellType.hexahedron)[gdim - 2]
         domain = create(MPI.COMM_WORLD, *(2,) * gdim, kind, partitioner=partitioner)

@@ -12,8 +12,8 @@ from mpi4py import MPI
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.assembly import integrate
+from cutsim.base.compat import evaluate, form
 from cutsim.base.compat import expression as compiled
-from cutsim.base.compat import form
 from cutsim.base.parameters import with_constants
 from cutsim.bodies.loads import Support, Traction
 from cutsim.bodies.solid import Solid
@@ -75,7 +75,7 @@ class Response:
 
     def __call__(self, F):
         self._F.value[:] = F
-        return self._values.eval(self._mesh, np.zeros(1, dtype=np.int32))[0]
+        return evaluate(self._values, self._mesh, np.zeros(1, dtype=np.int32))[0]
 
 
 response = functools.cache(Response)

@@ -11,7 +11,7 @@ from test_tangents import assert_slope_two, smooth
 
 from cutsim.analysis.stepping import StepControl, run
 from cutsim.base.assembly import integrate
-from cutsim.base.compat import expression, form
+from cutsim.base.compat import evaluate, expression, form
 from cutsim.base.parameters import with_constants
 from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.materials.directions import piecewise_direction
@@ -136,7 +136,7 @@ class PowerSum:
 
     def __call__(self, F, H, m):
         self._F.value[:], self._H.value[:], self._m.value = F, H, m
-        return self._values.eval(self._mesh, np.zeros(1, dtype=np.int32))[0]
+        return evaluate(self._values, self._mesh, np.zeros(1, dtype=np.int32))[0]
 
 
 @pytest.fixture(scope="module")

@@ -16,6 +16,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 from rich.console import Console
 
+from cutsim.base.compat import cell_partitioner
 from cutsim.base.units import KINDS, Units
 from cutsim.fields.space import cracked_space
 from cutsim.results.output import FieldWriter, HistoryWriter, read_history, write_summary
@@ -33,7 +34,7 @@ def folder(tmp_path):
 @pytest.fixture
 def body():
     """A square, torn open along its middle line: u_x = ±0.1 y, so F = I ± 0.1 e_x ⊗ e_y."""
-    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+    partitioner = cell_partitioner()
     square = mesh.create_unit_square(MPI.COMM_WORLD, 4, 4, mesh.CellType.quadrilateral, partitioner=partitioner)
     facets = mesh.locate_entities(square, 1, lambda x: np.isclose(x[0], 0.5))
     u = fem.Function(cracked_space(square, ("Lagrange", 1, (2,)), facets), name="u")

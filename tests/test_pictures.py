@@ -11,6 +11,7 @@ import pyvista
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
+from cutsim.base.compat import cell_partitioner
 from cutsim.fields.space import cracked_space
 from cutsim.results import pictures, plots
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid, revolved
@@ -28,7 +29,7 @@ def folder(tmp_path):
 def torn(shape, degree):
     """The unit square or cube with its right half moved by 0.25, damage = y at the crack between."""
     kind = mesh.CellType[shape]
-    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
+    partitioner = cell_partitioner()
     make = mesh.create_unit_square if mesh.cell_dim(kind) == 2 else mesh.create_unit_cube
     domain = make(MPI.COMM_WORLD, *(mesh.cell_dim(kind) * [4]), kind, partitioner=partitioner)
     tdim = domain.topology.dim

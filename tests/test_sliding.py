@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.compat import create_mesh, geometry_nodes, nodal_expression
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
@@ -84,15 +85,14 @@ def stack(*boxes, simplices=False, degree=1, comm=MPI.COMM_WORLD):
     cells, x, count = [], [], 0
     for low, high, n in boxes if comm.rank == 0 else ():
         part = create(MPI.COMM_SELF, [np.array(low, float), np.array(high, float)], n, kind)
-        cells.append(part.geometry.dofmap + count)
+        cells.append(geometry_nodes(part) + count)
         x.append(part.geometry.x[:, :gdim])
         count += len(x[-1])
     corners = 2**gdim if not simplices else gdim + 1
     cells = np.concatenate(cells) if cells else np.empty((0, corners), dtype=np.int64)
     x = np.concatenate(x) if x else np.empty((0, gdim))
     element = basix.ufl.element("Lagrange", kind.name, 1, shape=(gdim,))
-    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
-    domain = mesh.create_mesh(comm, cells.astype(np.int64), x, element, partitioner)
+    domain = create_mesh(comm, cells.astype(np.int64), x, element)
     return Stack(State(fem.functionspace(domain, ("Lagrange", degree, (gdim,)))), boxes)
 
 
@@ -220,7 +220,7 @@ def stresses(b):
     up = b.gdim - 1
     space = fem.functionspace(b.state.mesh, ("DG", 0))
     values = fem.Function(space)
-    values.interpolate(fem.Expression(E * b.state.u[up].dx(up), space.element.interpolation_points()))
+    values.interpolate(nodal_expression(E * b.state.u[up].dx(up), space))
     return values.x.array[: space.dofmap.index_map.size_local]
 
 

@@ -8,7 +8,7 @@ from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from cutsim.base.compat import jit_cache
+from cutsim.base.jit import jit_cache
 from cutsim.fields.space import cracked_space
 from cutsim.solvers import preconditioners
 from cutsim.solvers.newton import NonlinearProblem

@@ -9,7 +9,7 @@ from conftest import BILINEAR, EXPONENTIAL, NU, PPR, E, make_blocks, slopes
 from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_matrix
 
-from cutsim.base.compat import form
+from cutsim.base.compat import form, geometry_nodes
 from cutsim.fields.points import Surface
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
@@ -82,7 +82,7 @@ def jump_part(state, seed, size):
     field.x.array[:] = smooth(state.V, seed, size)
     gdim = state.mesh.geometry.dim
     cells = np.arange(state.mesh.topology.index_map(gdim).size_local, dtype=np.int32)
-    points = state.mesh.geometry.x[state.mesh.geometry.dofmap].mean(axis=1)
+    points = state.mesh.geometry.x[geometry_nodes(state.mesh)].mean(axis=1)
     w.x.array[:] = 0
     for cell in cells[points[:, gdim - 1] > 0.5]:
         dofs = state.V.dofmap.cell_dofs(cell)

@@ -2,6 +2,7 @@
 
 import numpy as np
 from dolfinx import fem, la
+from dolfinx.common import IndexMap
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -19,6 +20,14 @@ def nodal_forces(form: fem.Form) -> Array:
     b = fem.assemble_vector(form)
     b.scatter_reverse(la.InsertMode.add)
     return b.array[: b.index_map.size_local * b.block_size].copy()
+
+
+def owned_vector(index_map: IndexMap, bs: int) -> PETSc.Vec:
+    """PETSc vector of the owned dofs of a map, all zero; the caller destroys it."""
+    vector = PETSc.Vec().create(index_map.comm)
+    vector.setSizes((index_map.size_local * bs, index_map.size_global * bs), bsize=bs)
+    vector.setUp()
+    return vector
 
 
 def global_dot(comm: MPI.Comm, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

@@ -1,48 +1,49 @@
-"""Everything that depends on the installed dolfinx: compiling forms, and the cache of compiled kernels."""
+"""What differs between the versions of dolfinx and PETSc that are supported: dolfinx 0.9, 0.10 and 0.11.
 
-import fcntl
-import hashlib
-import os
-import platform
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+Nothing outside this module asks which version is installed.  Each function has the meaning of the newest version and
+is written for the older ones beside it.
+"""
+
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
+import basix.ufl
+import dolfinx
 import numpy as np
 import ufl
-from dolfinx import fem
-from dolfinx.mesh import Mesh
+from dolfinx import cpp, fem, graph
+from dolfinx.common import IndexMap
+from dolfinx.mesh import GhostMode, Mesh, MeshTags
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.jit import JIT_OPTIONS, jit_cache
+
+_VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+_BEFORE_0_10 = _VERSION < (0, 10)
+
+#: For each further mesh of a form, the map between its cells and the entities of the mesh integrated over.
+EntityMaps = Mapping[Mesh, Any]
+
+#: Reason of PETSc's SNES for a residual that is not finite.
+NOT_FINITE: int = getattr(PETSc.SNES.ConvergedReason, "DIVERGED_FUNCTION_NANORINF", None) or (
+    PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
+)
+
+#: PETSc options of line searches. From version 3.24 on PETSc cuts each step at λ = 1 by default, without a word; a
+#: softening bond needs the longer steps that "l2" finds.
+LINE_SEARCH_OPTIONS: dict[str, Any] = {"snes_linesearch_maxlambda": 1e8} if PETSc.Sys.getVersion() >= (3, 24) else {}
 
 
-def _processor() -> str:
-    """Short digest of the instruction set, so that a home shared by machines never serves foreign kernels."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.machine()
-    features = next((line for line in lines if line.startswith(("flags", "Features"))), platform.machine())
-    return hashlib.sha256(features.encode()).hexdigest()[:8]
-
-
-#: Kernels are compiled for the processor at hand, so each kind of processor has its own cache.
-CACHE_DIR = Path(os.getenv("XDG_CACHE_HOME", Path.home() / ".cache")) / "cutsim" / _processor()
-
-#: Options of every kernel compilation. Against plain -O2 these take 0.6 times as long for the tangent of a hexahedron
-#: at equal compile time. NaN must survive: a NaN residual is how an inverted element is recognised.
-JIT_OPTIONS: dict[str, Any] = {
-    "cffi_extra_compile_args": ["-O3", "-g0", "-march=native", "-ffast-math", "-fno-finite-math-only"],
-    "cache_dir": str(CACHE_DIR),
-    "timeout": 600,
-}
+# ---- forms and expressions
 
 
 def form(
     form: ufl.Form,
     *,
-    entity_maps: Mapping[Any, Any] | None = None,
+    entity_maps: EntityMaps | None = None,
     jit_options: Mapping[str, Any] | None = None,
     form_compiler_options: Mapping[str, Any] | None = None,
 ) -> fem.Form:
@@ -50,18 +51,19 @@ def form(
 
     Args:
         form: UFL form; every integral on one mesh.
-        entity_maps: For each further mesh, the map from entities of the integration mesh to its entities.
-        jit_options: Options that override `JIT_OPTIONS`.
+        entity_maps: Maps made by `create_submesh`, by submesh.
+        jit_options: Options that override `cutsim.base.jit.JIT_OPTIONS`.
         form_compiler_options: Options of FFCx.
 
     Returns:
         The compiled form.
     """
     options = {**JIT_OPTIONS, **(jit_options or {})}
+    maps = dict(entity_maps or {})
     with jit_cache(form.ufl_domain().ufl_cargo().comm, Path(options["cache_dir"])):
         return fem.form(
             form,
-            entity_maps=None if entity_maps is None else dict(entity_maps),
+            entity_maps=maps if _BEFORE_0_10 else list(maps.values()),
             jit_options=options,
             form_compiler_options=dict(form_compiler_options or {}),
         )
@@ -82,39 +84,110 @@ def expression(expression: Any, points: NDArray[np.float64], mesh: Mesh) -> fem.
         return fem.Expression(expression, points, jit_options=JIT_OPTIONS)
 
 
-# state of each cache directory (its time of change) in which nothing was found abandoned
-_clean: dict[Path, int] = {}
+def nodal_expression(expression_: Any, V: fem.FunctionSpace) -> fem.Expression:
+    """Compile a UFL expression at the interpolation points of a space, for `Function.interpolate`. Collective."""
+    points = V.element.interpolation_points
+    return expression(expression_, points() if callable(points) else points, V.mesh)
 
 
-@contextmanager
-def jit_cache(comm: MPI.Comm, directory: Path = CACHE_DIR) -> Iterator[None]:
-    """Share the kernel cache while compiling, having removed what a killed process left half built.
+def evaluate(expression: fem.Expression, mesh: Mesh, cells: NDArray[np.int32]) -> NDArray[np.float64]:
+    """Values of a compiled expression in cells.
 
-    A source file without its `.c.cached` mark makes the next compilation of the same form wait for a process
-    that is gone. While nobody else is compiling, which the lock tells, such a file is known to be abandoned.
+    Returns:
+        Shape (cells, points × components), the components of a point beside each other.
+    """
+    size = len(expression.X()) * int(np.prod(expression.ufl_expression.ufl_shape))
+    return np.asarray(expression.eval(mesh, cells)).reshape(len(cells), size)
+
+
+# ---- meshes
+
+
+def cell_partitioner(partition: Callable[..., Any] | None = None) -> Callable[..., Any]:
+    """Partitioner of cells that gives each rank the cells beyond its facets, as cracks need.
 
     Args:
-        comm: Communicator of the compilation; only its rank 0 compiles, so only that rank takes the lock.
-        directory: The cache.
+        partition: Graph partitioner; that of dolfinx by default.
     """
-    if comm.rank != 0:
-        yield
-        return
-    directory.mkdir(parents=True, exist_ok=True)
-    with open(directory / "lock", "w") as lock:  # unlocked when the file is closed, also when the process dies
-        if _clean.get(directory) != directory.stat().st_mtime_ns:
-            _remove_abandoned(directory, lock)
-        fcntl.flock(lock, fcntl.LOCK_SH)
-        yield
+    start = () if partition is None else (partition,)
+    # from 0.11 on the number of cells that may share a facet has to be said
+    cells_per_facet = () if _VERSION < (0, 11) else (2,)
+    return dolfinx.mesh.create_cell_partitioner(*start, GhostMode.shared_facet, *cells_per_facet)
 
 
-def _remove_abandoned(directory: Path, lock: TextIO) -> None:
-    """Remove half-built kernels unless somebody is compiling."""
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return
-    for source in directory.glob("*.c"):
-        if not source.with_suffix(".c.cached").exists():
-            source.unlink(missing_ok=True)
-    _clean[directory] = directory.stat().st_mtime_ns
+def create_mesh(
+    comm: MPI.Comm, cells: NDArray[np.int64], x: NDArray[np.float64], element: basix.ufl._ElementBase
+) -> Mesh:
+    """Mesh of nodes and the nodes of each cell, with the ghosts that cracks need. Collective.
+
+    Args:
+        comm: Communicator; each rank gives a part of the cells and nodes.
+        cells: Global node numbers, one cell a row.
+        x: Positions, one node a row.
+        element: Coordinate element.
+    """
+    geometry = (x, element) if _BEFORE_0_10 else (element, x)
+    return dolfinx.mesh.create_mesh(comm, cells, *geometry, cell_partitioner())
+
+
+def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags, MeshTags]:
+    """Distribute the gmsh model of rank 0: mesh, tags of cells, tags of facets. Collective."""
+    if _BEFORE_0_10:
+        from dolfinx.io import gmshio
+
+        mesh, cell_tags, facet_tags = gmshio.model_to_mesh(model, comm, 0, gdim, cell_partitioner())
+    else:
+        from dolfinx.io import gmsh
+
+        data = gmsh.model_to_mesh(model, comm, 0, gdim, cell_partitioner())
+        mesh, cell_tags, facet_tags = data.mesh, data.cell_tags, data.facet_tags
+    return mesh, cell_tags, facet_tags
+
+
+def geometry_nodes(mesh: Mesh) -> NDArray[np.int32]:
+    """Geometry nodes of each local cell, shape (cells, nodes of a cell)."""
+    return mesh.geometry.dofmap if _VERSION < (0, 11) else mesh.geometry.dofmaps[0]
+
+
+def create_submesh(mesh: Mesh, dim: int, entities: NDArray[np.int32]) -> tuple[Mesh, NDArray[np.int32], Any]:
+    """Mesh of some entities of a mesh. Collective.
+
+    Returns:
+        The submesh, the entity of the parent for each of its cells, and its map for `EntityMaps`.
+    """
+    submesh, parents = dolfinx.mesh.create_submesh(mesh, dim, entities)[:2]
+    if not _BEFORE_0_10:
+        cells = submesh.topology.index_map(dim)
+        local = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
+        return submesh, np.asarray(parents.sub_topology_to_topology(local, inverse=False)), parents
+    index_map = mesh.topology.index_map(dim)
+    to_cell = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
+    to_cell[parents] = np.arange(len(parents), dtype=np.int32)
+    return submesh, np.asarray(parents, dtype=np.int32), to_cell
+
+
+# ---- spaces with dofs of their own
+
+
+def index_map(comm: MPI.Comm, size: int, ghosts: NDArray[np.int64], owners: NDArray[np.int32]) -> IndexMap:
+    """Index map of owned indices and of ghosts, given by global index and owning rank. Collective."""
+    # the tag keeps the messages of maps that are made at the same time apart, which is never so here
+    return IndexMap(comm, size, ghosts, owners, *(() if _BEFORE_0_10 else (0,)))
+
+
+def with_dofs(parent: fem.FunctionSpace, index_map: IndexMap, dofs: NDArray[np.int32]) -> fem.FunctionSpace:
+    """A space with other dofs.
+
+    Args:
+        parent: The space with the mesh and the element.
+        index_map: Index map of the dofs.
+        dofs: Local dofs of every local cell, shape (cells, dofs of a cell).
+    """
+    mesh, old, of_cells = parent.mesh, parent.dofmap, graph.adjacencylist(dofs)
+    if _BEFORE_0_10:
+        dofmap = cpp.fem.DofMap(old.dof_layout, index_map, old.index_map_bs, of_cells, old.bs)
+        space = type(parent._cpp_object)(mesh._cpp_object, parent.element, dofmap, parent.value_shape)
+    else:
+        dofmap = cpp.fem.DofMap(old.dof_layout, index_map, old.index_map_bs, of_cells._cpp_object, old.bs)
+        space = type(parent._cpp_object)(mesh._cpp_object, parent.element._cpp_object, dofmap)
+    return fem.FunctionSpace(mesh, parent.ufl_element(), space)

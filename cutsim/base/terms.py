@@ -11,10 +11,10 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 
 #: Entries of the energy audit; the external work equals their sum (docs/theory.md §6).
@@ -55,7 +55,7 @@ class Term:
         raise TypeError(f"{type(self).__name__} has to write its virtual work")
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+    def entity_maps(self) -> EntityMaps:
         """Maps from mesh entities to the cells of submeshes on which coefficients of the term live."""
         return {}
 

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from cutsim.base.assembly import integrate
 from cutsim.base.checks import require
-from cutsim.base.compat import expression, form
+from cutsim.base.compat import evaluate, expression, form
 from cutsim.base.kinematics import Expr, cofactor, deformation_gradient, green_lagrange
 from cutsim.base.parameters import with_constants
 from cutsim.base.terms import Multiplier, Term
@@ -237,7 +237,7 @@ class Solid(Term):
         owned = self.state.mesh.topology.index_map(self.state.mesh.topology.dim).size_local
         cells = np.arange(owned, dtype=np.int32) if self.cells is None else self.cells[self.cells < owned]
         J = expression(ufl.det(self.deformation_gradient(self.state.u)), points, self.state.mesh)
-        values = J.eval(self.state.mesh, cells)
+        values = evaluate(J, self.state.mesh, cells)
         local = float(np.nan_to_num(values, nan=-np.inf).min()) if values.size else np.inf
         return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
 

@@ -11,17 +11,16 @@ from pathlib import Path
 
 import gmsh
 import numpy as np
-from dolfinx.io import gmshio
 from dolfinx.mesh import (
-    GhostMode,
     Mesh,
     MeshTags,
-    create_cell_partitioner,
     locate_entities,
     meshtags,
 )
 from mpi4py import MPI
 from numpy.typing import NDArray
+
+from cutsim.base.compat import model_to_mesh
 
 logger = logging.getLogger(__name__)
 
@@ -172,8 +171,7 @@ def _read(path: Path | str, comm: MPI.Comm, gdim: int, load: Callable[[], None])
         names, problem = comm.bcast((names, problem))
         if problem is not None:
             raise ValueError(f"path = {path}: {problem}")
-        partitioner = create_cell_partitioner(GhostMode.shared_facet)
-        mesh, cell_tags, facet_tags = gmshio.model_to_mesh(gmsh.model, comm, 0, gdim, partitioner)
+        mesh, cell_tags, facet_tags = model_to_mesh(gmsh.model, comm, gdim)
     return TaggedMesh(mesh, cell_tags, facet_tags, names)
 
 

@@ -8,11 +8,11 @@ import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem, la
-from dolfinx.mesh import Mesh, create_submesh
+from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.base.compat import form
+from cutsim.base.compat import EntityMaps, create_submesh, form
 from cutsim.base.kinematics import Expr
 from cutsim.fields.state import State
 
@@ -49,18 +49,15 @@ class FacetPoints:
         fdim = mesh.topology.dim - 1
         self._interior, self.degree = interior, degree
         self.measure = measure(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
-        self.submesh, parents = create_submesh(mesh, fdim, np.unique(np.asarray(facets, dtype=np.int32)))[:2]
-        self.facets = np.asarray(parents, dtype=np.int32)
-        index_map = mesh.topology.index_map(fdim)
-        self._facet_to_cell = np.full(index_map.size_local + index_map.num_ghosts, -1, dtype=np.int32)
-        self._facet_to_cell[parents] = np.arange(len(parents), dtype=np.int32)
+        unique = np.unique(np.asarray(facets, dtype=np.int32))
+        self.submesh, self.facets, self._entity_map = create_submesh(mesh, fdim, unique)
         self._owned = self.submesh.topology.index_map(fdim).size_local
         self.weights = self._assemble({"one": ufl.as_ufl(1.0)})()["one"]
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
-        """Map from facets of the mesh to cells of the submesh, for forms with functions of these points."""
-        return {self.submesh: self._facet_to_cell}
+    def entity_maps(self) -> EntityMaps:
+        """Map between facets of the mesh and cells of the submesh, for forms with functions of these points."""
+        return {self.submesh: self._entity_map}
 
     def function(self, components: int = 1) -> fem.Function:
         """A function with a value, or a vector of values, at each point."""

@@ -8,6 +8,8 @@ from dolfinx.mesh import Mesh, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.compat import geometry_nodes
+
 
 def facet_size(mesh: Mesh, facets: NDArray[np.int32]) -> NDArray[np.float64]:
     """Shortest edge of each of the given local facets: the mesh size for a front that crosses them. Collective."""
@@ -65,7 +67,7 @@ def _normal_extent(mesh: Mesh, facets: NDArray[np.int32]) -> NDArray[np.float64]
     across = corners[:, 2] - corners[:, 0] if tdim == 3 else np.array([0.0, 0.0, 1.0])
     normals = np.cross(along, across)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    from_facet = x[mesh.geometry.dofmap[np.concatenate(neighbours)]] - corners[rows, :1]
+    from_facet = x[geometry_nodes(mesh)[np.concatenate(neighbours)]] - corners[rows, :1]
     heights = np.abs(np.einsum("nvi,ni->nv", from_facet, normals[rows])).max(axis=1)
     extents = np.full(len(facets), np.inf)
     np.minimum.at(extents, rows, heights)

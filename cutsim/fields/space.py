@@ -11,13 +11,15 @@ from typing import Any
 
 import basix
 import numpy as np
-from dolfinx import cpp, fem, graph, la
+from dolfinx import cpp, fem, la
 from dolfinx.common import IndexMap, timed
 from dolfinx.mesh import Mesh, compute_midpoints
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
+from cutsim.base import compat
 
 Facets = NDArray[np.int32] | Sequence[NDArray[np.int32]]
 
@@ -359,11 +361,8 @@ def _split_dofs(
 
 def _with_dofs(parent: fem.FunctionSpace, dofs: NDArray[np.int64], owners: NDArray[np.int32]) -> fem.FunctionSpace:
     """The space with other dofs: global number and owner of those of every local cell, each (cells, dofs of a cell)."""
-    mesh, old = parent.mesh, parent.dofmap
-    index_map, local = _renumber(mesh.comm, dofs, owners)
-    dofmap = cpp.fem.DofMap(old.dof_layout, index_map, old.index_map_bs, graph.adjacencylist(local), old.bs)
-    space = type(parent._cpp_object)(mesh._cpp_object, parent.element, dofmap, parent.value_shape)
-    return fem.FunctionSpace(mesh, parent.ufl_element(), space)
+    index_map, local = _renumber(parent.mesh.comm, dofs, owners)
+    return compat.with_dofs(parent, index_map, local)
 
 
 def _renumber(comm: MPI.Comm, dofs: NDArray[np.int64], owners: NDArray[np.int32]) -> tuple[IndexMap, NDArray[np.int32]]:
@@ -371,7 +370,7 @@ def _renumber(comm: MPI.Comm, dofs: NDArray[np.int64], owners: NDArray[np.int32]
     here = owners == comm.rank
     start, end = (dofs[here].min(), dofs[here].max() + 1) if here.any() else (0, 0)
     ghosts, first, position = np.unique(dofs[~here], return_index=True, return_inverse=True)
-    index_map = IndexMap(comm, int(end - start), ghosts, owners[~here][first])
+    index_map = compat.index_map(comm, int(end - start), ghosts, owners[~here][first])
     local = dofs - start
     local[~here] = end - start + position
     return index_map, local.astype(np.int32)

@@ -4,10 +4,9 @@ import logging
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from dolfinx.mesh import Mesh
-from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import FacetPoints, Values
@@ -72,7 +71,7 @@ class HeatExchange:
         self.points.set(self._contact, mean)
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+    def entity_maps(self) -> EntityMaps:
         """Map from facets of the mesh to the mesh of the points."""
         return self.points.entity_maps
 

@@ -1,16 +1,14 @@
 """Heat across a crack: contact conductance, with friction and fracture as sources (docs/theory.md §3.4)."""
 
-from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 from cutsim.fields.points import Values
 from cutsim.fields.temperature import Temperature
@@ -63,7 +61,7 @@ class InterfaceHeat(HeatTerm):
         self.exchange = HeatExchange(temperature, crack.points, law, T("+"), T("-"), self.name)
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+    def entity_maps(self) -> EntityMaps:
         """Map from facets of the mesh to the crack's points."""
         return self.exchange.entity_maps
 

@@ -1,13 +1,10 @@
 """Heat between a rigid tool and the body it touches (docs/theory.md §3.4)."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import ufl
-from dolfinx.mesh import Mesh
-from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import History, Schedule
 from cutsim.fields.temperature import Temperature
@@ -66,7 +63,7 @@ class ToolHeat(HeatTerm):
             self.temperature.check("tool_temperature", self._tool_temperature.value)
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+    def entity_maps(self) -> EntityMaps:
         """Maps from facets of the mesh to the points of the surfaces."""
         return {mesh: cells for e in self.exchanges for mesh, cells in e.entity_maps.items()}
 

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from cutsim.base.checks import require
-from cutsim.base.compat import expression
+from cutsim.base.compat import evaluate, expression
 from cutsim.base.parameters import form_constants, substituted
 from cutsim.materials.elastic import Material
 
@@ -91,7 +91,7 @@ class Response:
         second = self._guess.copy()
         for _ in range(_ITERATIONS):
             self._second.x.array[self._dofs] = second
-            derivatives = self._values.eval(self._mesh, self._cells)
+            derivatives = evaluate(self._values, self._mesh, self._cells)
             if not np.isfinite(derivatives).all():
                 break
             # towards the minimum of W, also where it is not convex

@@ -6,17 +6,16 @@ face: T·n > 0 pulls them together.
 """
 
 import logging
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
-from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
 from cutsim.base.parameters import with_constants
 from cutsim.base.terms import Term
@@ -114,7 +113,7 @@ class Crack(Term):
     # -- virtual work ---------------------------------------------------------------------------------------------
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+    def entity_maps(self) -> EntityMaps:
         """Map from facets of the mesh to cells of the crack's submesh."""
         return self.points.entity_maps
 

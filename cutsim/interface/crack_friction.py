@@ -1,15 +1,13 @@
 """Friction between the faces of a crack (docs/theory.md §3.3; thesis 4.50–4.55)."""
 
 import logging
-from collections.abc import Mapping
 from typing import Literal
 
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
-from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.terms import Term
 from cutsim.fields.points import Values
@@ -77,7 +75,7 @@ class CrackFriction(Term):
         )
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray]:
+    def entity_maps(self) -> EntityMaps:
         """Map from facets of the mesh to cells of the crack's submesh."""
         return self.crack.entity_maps
 

@@ -12,7 +12,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.base.compat import expression
+from cutsim.base.compat import evaluate, expression
 from cutsim.base.kinematics import Expr
 
 logger = logging.getLogger(__name__)
@@ -167,7 +167,7 @@ class Spring:
     def _evaluate(self, compiled: fem.Expression, y: Array) -> Array:
         self._strain.x.array.reshape(-1, len(self._order) + 1)[self._dofs] = y
         size = int(np.prod(compiled.ufl_expression.ufl_shape))
-        return np.array(compiled.eval(self._mesh, self.cells)).reshape(*self._dofs.shape, size)
+        return evaluate(compiled, self._mesh, self.cells).reshape(*self._dofs.shape, size)
 
 
 def _cholesky(C: Expr) -> Expr:

@@ -23,7 +23,7 @@ from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
-from cutsim.base.compat import expression
+from cutsim.base.compat import evaluate, expression
 from cutsim.base.kinematics import Expr, green_lagrange
 from cutsim.fields.state import State
 from cutsim.materials.maxwell import Maxwell
@@ -171,7 +171,7 @@ class Overstress:
 
     def _evaluate(self) -> tuple[Array, Array]:
         """Strain and stress at the integration points, shape (cells, points, components) each."""
-        values = np.array(self._response.eval(self._state.mesh, self._cells))
+        values = evaluate(self._response, self._state.mesh, self._cells)
         stress, strain = np.split(values.reshape(*self._dofs.shape, 2 * len(self._pairs)), 2, axis=-1)
         return strain, stress
 

@@ -226,8 +226,7 @@ def interpolate(function: fem.Function, expression: Expr) -> None:
 
 def _compiled(function: fem.Function, expression: Expr) -> fem.Expression:
     """The expression at the interpolation points of a function's space."""
-    V = function.function_space
-    return compat.expression(expression, V.element.interpolation_points(), V.mesh)
+    return compat.nodal_expression(expression, function.function_space)
 
 
 @dataclass(frozen=True)

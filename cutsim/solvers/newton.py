@@ -39,7 +39,7 @@ _PAUSE = _Reason.CONVERGED_ITS
 _NOT_FINITE = "residual or tangent not finite (element inverted, J <= 0)"
 _SENTENCES = {
     _Reason.DIVERGED_FUNCTION_DOMAIN: _NOT_FINITE,
-    _Reason.DIVERGED_FNORM_NAN: _NOT_FINITE,
+    compat.NOT_FINITE: _NOT_FINITE,
     _Reason.DIVERGED_LINE_SEARCH: "line search failed",
     _Reason.DIVERGED_LOCAL_MIN: "line search failed at a local minimum of the residual",
     _Reason.DIVERGED_LINEAR_SOLVE: "linear solver did not converge",
@@ -88,7 +88,7 @@ class NonlinearProblem:
             PETSc does as told; otherwise they refine the preset of `cutsim.solvers.preconditioners.preset_for`, whose
             preconditioners have the prefixes `direct_`, `bulk_`, `crack_`, `strip_` and `saddle_`.
         entity_maps: Entity maps of the forms.
-        jit_options: Override `cutsim.base.compat.JIT_OPTIONS`.
+        jit_options: Override `cutsim.base.jit.JIT_OPTIONS`.
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
         symmetric: Whether the tangent is symmetric.
         inertia: Whether inertia balances forces, too: there may be supports without any reaction.
@@ -115,7 +115,7 @@ class NonlinearProblem:
         bcs: Sequence[fem.DirichletBC] = (),
         J: ufl.Form | None = None,
         petsc_options: Mapping[str, Any] | None = None,
-        entity_maps: Mapping[Any, Any] | None = None,
+        entity_maps: compat.EntityMaps | None = None,
         jit_options: Mapping[str, Any] | None = None,
         interface_dofs: NDArray[np.int32] | None = None,
         symmetric: bool = False,
@@ -168,7 +168,7 @@ class NonlinearProblem:
         self._snes.setLineSearchPreCheck(self._check_step)
         # stol = 0: a small step is no sign of equilibrium.
         self._snes.setTolerances(rtol=rtol, stol=0.0, max_it=25)
-        self._options.default({"snes_linesearch_type": LINE_SEARCHES[0]})
+        self._options.default({"snes_linesearch_type": LINE_SEARCHES[0], **compat.LINE_SEARCH_OPTIONS})
         self._lagged: LaggedPC | None = None
         if "pc_type" not in self._options and "ksp_type" not in self._options:
             has_interface, gdim = self._interface_dofs is not None, self.u.function_space.mesh.geometry.dim
@@ -361,7 +361,7 @@ class NonlinearProblem:
         self._force = max(reaction, start) if self._by_start else reaction
         self._scale = max(self._previous_scale, self._force)
         if not np.isfinite(free):
-            return _Reason.DIVERGED_FNORM_NAN
+            return compat.NOT_FINITE
         if bcs_hold and free <= max(self._rtol * self._scale, floor):
             return _Reason.CONVERGED_FNORM_RELATIVE
         if free > GROWTH * max(start, self._scale):

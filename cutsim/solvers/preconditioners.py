@@ -9,6 +9,8 @@ from dolfinx import fem, la
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from cutsim.base.assembly import owned_vector
+
 #: Unknowns up to which a factorisation is the fastest, by dimension of space.
 DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 10_000}
 #: The same with a crack: nearly incompressible, stretched cells under a blade cost multigrid 45 iterations a solve.
@@ -137,7 +139,7 @@ def rigid_body_modes(V: fem.FunctionSpace) -> PETSc.NullSpace:
         rotation = np.zeros((n, gdim))
         rotation[:, i], rotation[:, j] = -x[:, j], x[:, i]
         modes.append(rotation)
-    vectors = [la.create_petsc_vector(V.dofmap.index_map, bs) for _ in modes]
+    vectors = [owned_vector(V.dofmap.index_map, bs) for _ in modes]
     for vector, mode in zip(vectors, modes, strict=True):
         vector.array[:] = mode.ravel()
     _orthonormalise(vectors)

@@ -8,7 +8,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from cutsim.base.assembly import Array
+from cutsim.base.assembly import Array, owned_vector
 from cutsim.base.terms import Term
 
 
@@ -38,7 +38,7 @@ class Residual:
         self._comm: MPI.Comm = V.mesh.comm
         self.n = layout[0].size_local * layout[1]
         self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
-        self._added = la.create_petsc_vector(*layout)
+        self._added = owned_vector(*layout)
         self.known: Array = np.zeros(self.n)
         self.fixed: NDArray[np.bool_] = np.zeros(self.n, dtype=bool)
         for bc in self._bcs:

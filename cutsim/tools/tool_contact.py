@@ -1,18 +1,16 @@
 """A rigid tool in the body: contact on outer surfaces and crack faces, friction, reactions (docs/theory.md §4)."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
-from numpy.typing import NDArray
 
 from cutsim.base.assembly import integrate, moment, nodal_forces, resultant
 from cutsim.base.checks import require
-from cutsim.base.compat import form
+from cutsim.base.compat import EntityMaps, form
 from cutsim.base.kinematics import Expr, tangential
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import Surface, Values
@@ -141,7 +139,7 @@ class ToolContact(RigidTool):
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
 
     @property
-    def entity_maps(self) -> Mapping[Mesh, NDArray[np.int32]]:
+    def entity_maps(self) -> EntityMaps:
         """Maps from facets of the mesh to the points of the surfaces."""
         return {mesh: cells for p in self.patches for mesh, cells in p.surface.points.entity_maps.items()}
 

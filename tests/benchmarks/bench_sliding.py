@@ -14,6 +14,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from cutsim import Coulomb, Mechanics, NeoHookean, Solid, State, StepControl, StepReport, Support, SurfacePair, run
+from cutsim.base.compat import create_mesh, geometry_nodes
 
 EDGE, PRESS, DRAW = 10.0, 1.0, 3.0
 COMM = MPI.COMM_WORLD
@@ -25,12 +26,11 @@ def cubes(upper: int, lower: int) -> mesh.Mesh:
     for n, bottom in ((lower, 0.0), (upper, EDGE)) if COMM.rank == 0 else ():
         corners = [[0.0, 0.0, bottom], [EDGE, EDGE, bottom + EDGE]]
         cube = mesh.create_box(MPI.COMM_SELF, corners, [n] * 3, mesh.CellType.hexahedron)
-        cells.append(cube.geometry.dofmap + sum(len(part) for part in x))
+        cells.append(geometry_nodes(cube) + sum(len(part) for part in x))
         x.append(cube.geometry.x)
     element = basix.ufl.element("Lagrange", "hexahedron", 1, shape=(3,))
-    partitioner = mesh.create_cell_partitioner(mesh.GhostMode.shared_facet)
     topology = np.vstack([np.empty((0, 8), dtype=np.int64), *cells])
-    return mesh.create_mesh(COMM, topology, np.vstack([np.empty((0, 3)), *x]), element, partitioner)
+    return create_mesh(COMM, topology, np.vstack([np.empty((0, 3)), *x]), element)
 
 
 def faces(domain: mesh.Mesh, z: float, above: bool) -> np.ndarray:
