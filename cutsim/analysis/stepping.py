@@ -4,7 +4,6 @@ One step: begin → move tools and loads → solve → (failure: roll back, anot
 history → accept or reject → commit, record.
 """
 
-import logging
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,11 +16,12 @@ from mpi4py import MPI
 
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.base.log import collective_logger
 from cutsim.base.terms import Term
 from cutsim.fields.state import State
 from cutsim.solvers.newton import Outcome
 
-logger = logging.getLogger(__name__)
+logger = collective_logger(__name__)
 
 # a step that would leave less than this fraction of itself before a corner is stretched to meet it
 _SLIVER = 0.1

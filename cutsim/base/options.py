@@ -1,5 +1,6 @@
 """PETSc options under one prefix, so that those of one solver never reach another."""
 
+import atexit
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,7 +10,7 @@ from cutsim.base.checks import require
 
 
 class Options:
-    """Options of one prefix in PETSc's database, kept there until `clear`.
+    """Options of one prefix in PETSc's database, kept there until `clear` or the end of the program.
 
     They stay for the lifetime of the solver because PETSc reads some of them late, when a preconditioner is built.
 
@@ -36,6 +37,7 @@ class Options:
         """Set an option, overwriting it."""
         self._database.setValue(name, value)
         self._own.add(name)
+        _ever_set.add(self.prefix + name)
 
     def default(self, options: Mapping[str, Any], part: str = "") -> None:
         """Set options that are not set yet.
@@ -53,3 +55,14 @@ class Options:
         for name in self._own:
             self._database.delValue(name)
         self._own.clear()
+
+
+_ever_set: set[str] = set()
+
+
+@atexit.register
+def _clear_all() -> None:
+    """Leave nothing to PETSc, which lists at its end, after this, the options that no solver has read."""
+    database = PETSc.Options()
+    for name in _ever_set:
+        database.delValue(name)

@@ -1,15 +1,14 @@
 """With how many points the two parts of a strain energy are integrated."""
 
-import logging
-
 import numpy as np
 import ufl
 from numpy.typing import NDArray
 
+from cutsim.base.log import collective_logger
 from cutsim.fields.state import State
 from cutsim.materials.elastic import Material
 
-logger = logging.getLogger(__name__)
+logger = collective_logger(__name__)
 
 #: Poisson's ratio from which the volumetric part is integrated with fewer points by default.
 NEARLY_INCOMPRESSIBLE = 0.45

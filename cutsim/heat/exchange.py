@@ -1,6 +1,5 @@
 """Heat exchange between two surfaces at their integration points: fluxes, interface temperature, entropy."""
 
-import logging
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -8,12 +7,13 @@ import numpy as np
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
+from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.contact_heat import HeatLaw
 
-logger = logging.getLogger(__name__)
+logger = collective_logger(__name__)
 
 # negative contact dissipation down to this fraction of the largest one is rounding
 _ROUNDING = 1e-9

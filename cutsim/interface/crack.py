@@ -5,7 +5,6 @@ jump is δ = u⁻ − u⁺, the normal n points from '+' to '−', and the tract
 face: T·n > 0 pulls them together.
 """
 
-import logging
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
+from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
 from cutsim.base.terms import Term
 from cutsim.fields.points import FacetPoints, Surface, Values
@@ -28,7 +28,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.law import Response, respond
 
-logger = logging.getLogger(__name__)
+logger = collective_logger(__name__)
 
 
 @dataclass(frozen=True)

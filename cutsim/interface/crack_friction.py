@@ -1,6 +1,5 @@
 """Friction between the faces of a crack (docs/theory.md §3.3; thesis 4.50–4.55)."""
 
-import logging
 from typing import Literal
 
 import ufl
@@ -9,13 +8,14 @@ from dolfinx import fem
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
+from cutsim.base.log import collective_logger
 from cutsim.base.terms import Term
 from cutsim.fields.points import Values
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
 
-logger = logging.getLogger(__name__)
+logger = collective_logger(__name__)
 
 _AREAS = ("broken", "contact", "thesis")
 

@@ -1,6 +1,5 @@
 """The nonlinear problem F(u; v) = 0: one Newton solver with a preconditioner that looks after itself."""
 
-import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
@@ -15,6 +14,7 @@ from petsc4py import PETSc
 
 from cutsim.base import compat
 from cutsim.base.checks import require
+from cutsim.base.log import collective_logger
 from cutsim.base.options import Options
 from cutsim.base.terms import Multiplier, Term
 from cutsim.solvers.multipliers import Multipliers
@@ -22,7 +22,7 @@ from cutsim.solvers.preconditioners import LaggedPC, Preset, create_lagged, fall
 from cutsim.solvers.residual import Residual
 from cutsim.solvers.tangent import Tangent
 
-log = logging.getLogger(__name__)
+log = collective_logger(__name__)
 
 LINE_SEARCHES = ("l2", "bt", "basic")
 #: Rounding level of the residual, as a fraction of the nodal forces ||diag(K)|| (max |u| + h) that cancel in it. The

@@ -1,6 +1,5 @@
 """A rigid tool in the body: contact on outer surfaces and crack faces, friction, reactions (docs/theory.md §4)."""
 
-import logging
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -12,6 +11,7 @@ from cutsim.base.assembly import integrate, moment, nodal_forces, resultant
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps, form
 from cutsim.base.kinematics import Expr, tangential
+from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import Surface, Values
 from cutsim.fields.state import State
@@ -21,7 +21,7 @@ from cutsim.interface.slip import SlipHistory, completed
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import Path, Shape
 
-logger = logging.getLogger(__name__)
+logger = collective_logger(__name__)
 
 
 class Patch:

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,8 +14,9 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from cutsim.base.checks import require
+from cutsim.base.log import collective_logger
 
-logger = logging.getLogger(__name__)
+logger = collective_logger(__name__)
 
 #: Distance below which two nodes are one, as a fraction of the size of the surface: formats repeat rounded nodes.
 SAME = 1e-7
