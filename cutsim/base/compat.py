@@ -32,7 +32,7 @@ NOT_FINITE: int = getattr(PETSc.SNES.ConvergedReason, "DIVERGED_FUNCTION_NANORIN
     PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN
 )
 
-#: PETSc options of line searches. Newer versions of PETSc (3.25 does) cut each step at λ = 1 by default, without a word;
+#: PETSc options of line searches. Newer versions of PETSc, such as 3.25, cut each step at λ = 1 without a word;
 #: a softening bond needs the longer steps that "l2" finds. Older ones have no such bound and do not read the option.
 LINE_SEARCH_OPTIONS: dict[str, Any] = {"snes_linesearch_maxlambda": 1e8}
 
