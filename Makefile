@@ -1,7 +1,8 @@
 # make help lists the targets. Each makes the set-up it needs (scripts/setup.sh) and only once.
+# DOLFINX=wheel|system and PYTHON=/path/to/python3 choose what it takes; docs/install.md says how.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-mpi bench lint docs clean
+.PHONY: help setup demo test test-mpi bench lint docs dist clean always
 
 NAME ?= blade
 JOBS ?= $(shell nproc)
@@ -13,7 +14,8 @@ RUN := scripts/run $(if $(RANKS),-n $(RANKS))
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
-$(STAMP): pyproject.toml scripts/setup.sh
+# The script sees for itself whether .venv is whole and up to date, and then leaves the stamp alone.
+$(STAMP): always
 	@bash scripts/setup.sh
 
 setup: $(STAMP) ## install what is missing
@@ -48,6 +50,9 @@ $(DOCS_STAMP): $(STAMP)
 docs: $(DOCS_STAMP) ## build docs/_build/html
 	$(PYTHON_IN_VENV) -m sphinx -W --keep-going -b html docs docs/_build/html
 
-clean: ## remove results, caches and built docs; keeps .venv
-	rm -rf results docs/_build docs/jupyter_execute .mypy_cache .ruff_cache .pytest_cache
+dist: ## build sdist and wheel into dist/, and cut with the wheel from an empty environment elsewhere
+	bash scripts/dist.sh
+
+clean: ## remove results, caches, built docs and packages; keeps .venv
+	rm -rf results dist docs/_build docs/jupyter_execute .mypy_cache .ruff_cache .pytest_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -9,7 +9,7 @@ from cutsim.bodies.loads import Pressure, Support, Traction
 from cutsim.bodies.schemes import GeneralisedAlpha, Newmark
 from cutsim.bodies.solid import Solid
 from cutsim.fields.laminate import laminate
-from cutsim.fields.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
+from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_msh, tag_mesh
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
@@ -114,6 +114,7 @@ __all__ = [
     "Triangulation",
     "Yeoh",
     "cracked_space",
+    "geometry",
     "laminate",
     "piecewise_direction",
     "read_geo",

@@ -1,48 +1,57 @@
 #!/usr/bin/env bash
-# Set up everything cutsim needs: dolfinx 0.9 from the system, then .venv with cutsim in it.
+# Set up everything cutsim needs: a dolfinx of version 0.9, 0.10 or 0.11, and .venv with cutsim in it.
 #
-#   bash scripts/setup.sh                      does nothing when .venv is up to date
-#   PYTHON=/path/to/python3 bash scripts/setup.sh    use this interpreter if it imports dolfinx 0.9
+#   bash scripts/setup.sh                            does nothing when .venv is up to date
+#   PYTHON=/path/to/python3 bash scripts/setup.sh    from this interpreter
+#   DOLFINX=wheel|system bash scripts/setup.sh       with dolfinx from PyPI, or from the system
 #
-# dolfinx comes from the first of: a Python that imports it already; apt (Debian 13, recent Ubuntu);
-# the trixie suite, pinned low, on Debian 12. Elsewhere the script explains other ways and stops.
+# dolfinx comes from the first of: a Python that imports it already; its wheel, for any Python from 3.12
+# on; apt (Debian 13, recent Ubuntu); its wheel with a Python from uv, from apt, or on Debian 12 from the
+# suite trixie, pinned low. Elsewhere the script explains other ways and stops.
 set -Eeuo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
+task=setup
 VENV=.venv
 STAMP=$VENV/.setup-stamp
-# dolfinx and meshing, the C compiler its forms need, MPI, a fast BLAS, venv, off-screen pictures.
-PACKAGES=(
+# A .venv that is active is what to make, not what to make it from.
+PATH=$(tr : '\n' <<<"$PATH" | grep -vxF "$PWD/$VENV/bin" | paste -sd :)
+# shellcheck source=scripts/python.sh
+source scripts/python.sh
+
+PICTURE_PACKAGES=(libegl1 libgl1-mesa-dri) # those draw off screen
+# What cutsim takes from Debian beside dolfinx: meshing, the C compiler that forms need, MPI, a fast BLAS,
+# virtual environments, pictures. apt is given the list as a whole, so that versions fit each other.
+SYSTEM_PACKAGES=(
     python3-dolfinx-real python3-petsc4py-real python3-gmsh python3-meshio python3-matplotlib python3-pytest
-    gcc libc6-dev mpi-default-bin libopenblas0-pthread
+    gcc libc6-dev libpython3-dev mpi-default-bin libopenblas0-pthread
     python3-venv python3-pip-whl python3-setuptools-whl
-    libgl1 libegl1 libgl1-mesa-dri libxrender1
+    "${PICTURE_PACKAGES[@]}"
 )
-PROBE='
-import sys
-assert sys.version_info >= (3, 11), "Python is older than 3.11"
-import dolfinx, ensurepip, mpi4py, numpy, petsc4py, venv
-assert dolfinx.__version__.startswith("0.9."), f"its dolfinx is {dolfinx.__version__}, not 0.9"
-assert dolfinx.default_scalar_type is numpy.float64, "its dolfinx is not built for real double precision"
+# The shared libraries that the wheel of gmsh needs, and what has them, and those for pictures off screen.
+LIBRARIES=(
+    libGLU.so.1 libGL.so.1 libXrender.so.1 libXcursor.so.1 libXfixes.so.3 libXext.so.6 libXft.so.2
+    libfontconfig.so.1 libXinerama.so.1 libX11.so.6 libgomp.so.1
+)
+LIBRARY_PACKAGES=(
+    libglu1-mesa libgl1 libxrender1 libxcursor1 libxfixes3 libxext6 libxft2 libfontconfig1 libxinerama1 libx11-6 libgomp1
+)
+FEDORA_PACKAGES=(
+    gcc python3-devel mesa-libGLU libglvnd-glx libglvnd-egl mesa-dri-drivers libXrender libXcursor libXfixes
+    libXext libXft fontconfig libXinerama libX11 libgomp
+)
+COMPILES='
+import os, shlex, subprocess, sysconfig, tempfile
+compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC"))
+with tempfile.TemporaryDirectory() as folder:
+    arguments = ["-I", sysconfig.get_path("include"), "-shared", "-fPIC", "-x", "c", "-", "-o", folder + "/probe.so"]
+    subprocess.run([*compiler, *arguments], input=b"#include <Python.h>", check=True)
 '
-step="starting"
-release=()
-
-say() { printf '[setup] %s\n' "$*"; }
-
-die() {
-    trap - ERR
-    printf '[setup] FAILED while %s.\n' "$step" >&2
-    printf '[setup] %s\n' "$@" >&2
-    exit 1
-}
-trap 'die "This command did not succeed: $BASH_COMMAND" \
-    "Its own message is above. Put that right and run the same command again."' ERR
-
-begin() {
-    step=$1
-    say "$1 ..."
-}
+LOADS_LIBRARIES="
+import ctypes
+for name in '${LIBRARIES[*]}'.split():
+    ctypes.CDLL(name)
+"
 
 attended() { [[ -t 0 && -t 1 ]]; }
 
@@ -53,19 +62,20 @@ confirm() {
     [[ $answer != [nN]* ]] || die "Stopped on request; nothing of this step was changed."
 }
 
-# ---------------------------------------------------------------- a Python with dolfinx 0.9
-find_python() {
-    local candidate reason
-    for candidate in ${PYTHON:+"$PYTHON"} "$VENV/bin/python" python3 /usr/bin/python3; do
-        candidate=$(command -v "$candidate") || continue
-        if reason=$("$candidate" -c "$PROBE" 2>&1); then
-            python=$candidate
-            say "$python imports dolfinx 0.9"
-            return 0
-        fi
-        say "$candidate cannot be used: $(tail -n 1 <<<"$reason")"
-    done
-    return 1
+# ---------------------------------------------------------------- the .venv there is
+stamped() { sed -n "s/^$1=//p" "$STAMP" 2>/dev/null; }
+
+# The stamp is written last: without it, or elsewhere, or with its Python gone, .venv is half made.
+venv_is_whole() {
+    [[ $(stamped place) == "$PWD" ]] && ask "$PWD/$VENV/bin/python" '
+import importlib.util, sys
+sys.exit(not all(map(importlib.util.find_spec, ("cutsim", "dolfinx", "pyvista"))))' >/dev/null
+}
+
+venv_is_wanted() {
+    [[ -z ${DOLFINX:-} || $DOLFINX == "$(stamped way)" ]] || return 1
+    [[ -z ${PYTHON:-} || $PYTHON -ef $VENV/bin/python && $PYTHON == *$VENV/bin/* ]] ||
+        [[ $(ask "$PYTHON" 'import sys; print(sys.executable)') == "$(stamped python)" ]]
 }
 
 # ---------------------------------------------------------------- system packages
@@ -83,21 +93,51 @@ apt() {
     as_root env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 -q "$@"
 }
 
-missing_packages() {
-    local package
-    for package in "${PACKAGES[@]}"; do
-        [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || echo "$package"
-    done
+refresh() {
+    can_be_root || return 0
+    begin "refreshing the package lists (apt-get update)"
+    apt update || say "some lists could not be refreshed; going on with those there are"
 }
 
-# Debian 12 carries dolfinx 0.5: take packages from trixie, at a priority that leaves all others alone.
-use_trixie() {
-    release=(-o APT::Default-Release=trixie)
+# install PURPOSE RELEASE PACKAGES...: RELEASE is a suite to prefer, or empty.
+install() {
+    local plan removed purpose=$1 release=${2:+-o APT::Default-Release=$2}
+    shift 2
+    step="installing $purpose"
+    can_be_root || die "This needs root rights, or sudo that does not ask when there is no terminal." \
+        "Next: let an administrator run" \
+        "  apt-get update && apt-get install --no-install-recommends $*" "then: make setup"
+    # shellcheck disable=SC2086 # an empty release is no argument
+    plan=$(apt-get $release -s install --no-install-recommends "$@")
+    removed=$(awk '/^Remv/ { printf " %s", $2 }' <<<"$plan")
+    say "apt-get will install $purpose: $*"
+    say "  in all $(grep -cE '^Inst \S+ \(' <<<"$plan") packages new," \
+        "$(grep -cE '^Inst \S+ \[' <<<"$plan") upgraded; removed:${removed:- none}"
+    confirm
+    # shellcheck disable=SC2086
+    apt $release -y -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold \
+        install --no-install-recommends "$@"
+}
+
+offers() {
+    local version
+    version=$(apt-cache policy "$1" | awk '/Candidate:/ { print $2 }')
+    [[ ${version:=none} != *none* ]] && dpkg --compare-versions "$version" ge "$2" &&
+        dpkg --compare-versions "$version" lt "$3" && return
+    refused+=("apt offers $1 $version")
+    return 1
+}
+
+on_bookworm() { [[ $(apt-cache policy) == *o=Debian,*n=bookworm,* ]]; }
+
+# Debian 12 has Python 3.11: take 3.13 from trixie, at a priority that leaves all other packages alone.
+add_trixie() {
     [[ $(apt-cache policy) != *n=trixie,* ]] || return 0
     local mirror name=cutsim-trixie
+    # shellcheck disable=SC2016 # a format of apt's
     mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Codename: bookworm' \
         'Component: main' 'Label: Debian' | head -n 1)
-    say "Debian 12 has no dolfinx 0.9: the suite trixie of $mirror will be added, pinned to 100:"
+    say "The suite trixie of $mirror will be added, pinned to 100:"
     say "  /etc/apt/sources.list.d/$name.list and /etc/apt/preferences.d/$name"
     confirm
     printf 'Package: *\nPin: release n=trixie\nPin-Priority: 100\n' |
@@ -106,51 +146,136 @@ use_trixie() {
     apt update
 }
 
-offers_dolfinx() {
-    local version
-    version=$(apt-cache "${release[@]}" policy python3-dolfinx-real | awk '/Candidate:/ { print $2 }')
-    say "apt offers python3-dolfinx-real ${version:-not at all}"
-    [[ -n $version ]] && dpkg --compare-versions "$version" ge 1:0.9 &&
-        dpkg --compare-versions "$version" lt 1:0.10~
+# python3.N with what Debian splits off from it.
+python_packages() { echo "$1 $1-venv lib$1-dev python3-pip-whl python3-setuptools-whl"; }
+
+# ---------------------------------------------------------------- where dolfinx comes from
+choose() {
+    local packages
+    step="looking for dolfinx"
+    if [[ ${DOLFINX:-} != wheel ]] && find_system_python; then
+        way=system
+    elif [[ ${DOLFINX:-} != system ]] && find_wheel_python; then
+        way=wheel
+    else
+        [[ -z ${PYTHON:-} ]] || explain
+        provide_python || explain
+    fi
 }
 
-install_packages() {
-    local plan removed packages
-    step="installing system packages"
-    mapfile -t packages < <(missing_packages)
-    ((${#packages[@]})) || return 0
-    can_be_root || die "This needs root rights, or sudo that does not ask when there is no terminal." \
-        "Or let an administrator install (on Debian 12 from the suite trixie): ${packages[*]}"
-    begin "refreshing the package lists (apt-get update)"
-    apt update || say "some lists could not be refreshed; going on with those there are"
-    if [[ $(apt-cache policy) == *o=Debian,*n=bookworm,* ]]; then use_trixie; fi
-    offers_dolfinx || explain
-    step="installing system packages"
-    plan=$(apt-get "${release[@]}" -s install --no-install-recommends "${packages[@]}")
-    removed=$(awk '/^Remv/ { printf " %s", $2 }' <<<"$plan")
-    say "apt-get will install: ${packages[*]}"
-    say "  in all $(grep -c '^Inst' <<<"$plan") packages new or upgraded; removed:${removed:- none}"
-    confirm
-    apt "${release[@]}" -y -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold \
-        install --no-install-recommends "${packages[@]}"
+# No Python that will do is here: get one, with dolfinx or for its wheel.
+provide_python() {
+    local apt_here=
+    if command -v apt-get >/dev/null; then
+        apt_here=yes
+        refresh
+    fi
+    if [[ $apt_here && ${DOLFINX:-} != wheel ]] && offers python3-dolfinx-real 1:0.9 1:0.12~; then
+        say "dolfinx will come from apt, and the rest go into $VENV."
+        install "dolfinx and what belongs to it" "" "${SYSTEM_PACKAGES[@]}"
+        way=system
+        find_system_python
+        return
+    fi
+    [[ ${DOLFINX:-} != system ]] && wheel_fits_machine || return 1
+    way=wheel
+    if command -v uv >/dev/null; then
+        say "Python 3.13 will come from uv, and dolfinx's wheel and the rest go into $VENV."
+        uv python install 3.13 && find_wheel_python && return
+        refused+=("uv python install 3.13 failed; its message is above")
+    fi
+    [[ $apt_here ]] || return 1
+    if offers python3 3.12 4; then
+        say "Python will come from apt, and dolfinx's wheel and the rest go into $VENV."
+        # shellcheck disable=SC2046 # a list
+        install "Python" "" $(python_packages python3)
+    elif on_bookworm && can_be_root; then
+        say "Debian 12 has no Python from 3.12 on: 3.13 will come from Debian 13 (trixie), and dolfinx's wheel" \
+            "and the rest go into $VENV."
+        add_trixie
+        # shellcheck disable=SC2046
+        install "Python 3.13" trixie $(python_packages python3.13)
+    else
+        return 1
+    fi
+    find_wheel_python
 }
 
 explain() {
-    step="looking for dolfinx 0.9"
-    die "No Python here imports it and this system's package manager does not offer it." \
-        "Either use conda-forge:" \
-        "  conda create -n cutsim -c conda-forge python=3.12 fenics-dolfinx=0.9 'petsc=*=real*' \\" \
-        "      python-gmsh meshio c-compiler make" \
-        "  conda activate cutsim, then run the same command again" \
-        "or a container with dolfinx in it:" \
-        "  docker run -it --rm -v \"\$PWD\":/cutsim -w /cutsim dolfinx/dolfinx:v0.9.0 make demo" \
-        "or name an interpreter that imports dolfinx 0.9: PYTHON=/path/to/python3 make demo"
+    ((${#refused[@]} == 0)) || printf '[setup] %s\n' "${refused[@]}" | awk '!seen[$0]++' >&2
+    if [[ ${PYTHON:-} ]]; then
+        die "PYTHON=$PYTHON can be used neither for its dolfinx nor for the wheel${DOLFINX:+ (DOLFINX=$DOLFINX)}: see above." \
+            "Next: name another, or none: make setup"
+    fi
+    die "No Python here imports dolfinx 0.9, 0.10 or 0.11, none takes its wheel, and no package was found" \
+        "that would help${DOLFINX:+ with DOLFINX=$DOLFINX}. Next, one of these:" \
+        "  uv python install 3.13 && make setup           (no root; uv: pip install uv)" \
+        "  conda env create -f environment.yml && conda activate cutsim && make setup" \
+        "  docker build -t cutsim . && docker run -it --rm cutsim" \
+        "  PYTHON=/path/to/python3 make setup             (one that is 3.12 or later, or imports dolfinx)" \
+        "docs/install.md says more about each."
+}
+
+# ---------------------------------------------------------------- what compiles, meshes and draws
+# Packages of Debian and Ubuntu without which $python can do nothing here.
+essentials() {
+    local name=python3
+    ! from_package || name=$(basename "$(readlink -f "$python")")
+    ask "$python" "$MAKES_VENV" >/dev/null || python_packages "$name"
+    ask "$python" "$COMPILES" >/dev/null || echo "gcc libc6-dev lib$name-dev"
+    if [[ $way == wheel ]] || ! ask "$python" "import gmsh" >/dev/null; then
+        ask "$python" "$LOADS_LIBRARIES" >/dev/null || echo "${LIBRARY_PACKAGES[*]}"
+    fi
+}
+
+# Those for pictures, and for speed where dolfinx is Debian's.
+recommended() {
+    if [[ $way == system ]] && from_package; then
+        for package in "${SYSTEM_PACKAGES[@]}"; do
+            [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || echo "$package"
+        done
+    else
+        ask "$python" "import ctypes; ctypes.CDLL('libEGL.so.1')" >/dev/null || echo "${PICTURE_PACKAGES[*]}"
+    fi
+}
+
+from_package() { dpkg-query -S "$(readlink -f "$python")" &>/dev/null; }
+
+complete_system() {
+    local packages extra release="" reason
+    read -ra packages < <(essentials | xargs)
+    read -ra extra < <(recommended | xargs)
+    ((${#packages[@]} + ${#extra[@]})) || return 0
+    if ! command -v apt-get >/dev/null; then
+        ((${#packages[@]})) || return 0
+        die "A C compiler, Python's headers or shared libraries of gmsh are missing." "Next, on Fedora:" \
+            "  sudo dnf install ${FEDORA_PACKAGES[*]}" "or their like elsewhere, then: make setup"
+    fi
+    if can_be_root; then
+        [[ $way == wheel ]] || ! from_package || packages=("${SYSTEM_PACKAGES[@]}")
+        # Only there has Debian 12 what belongs to a newer Python.
+        [[ ${packages[*]} != *python3.1[2-9]-venv* ]] || ! on_bookworm || release=trixie
+        refresh
+        install "what is missing beside $python" "$release" "${packages[@]}" "${extra[@]}"
+    elif ((${#packages[@]})); then
+        install "what is missing beside $python" "" "${packages[@]}" "${extra[@]}"
+    else
+        say "NOTE: recommended, not installed: ${extra[*]}"
+    fi
+    step="checking $python"
+    reason=$(ask "$python" "$MAKES_VENV") || die "It makes no virtual environments: ${reason##*$'\n'}" \
+        "Next: name another Python: PYTHON=/path/to/python3 make setup"
+    reason=$(ask "$python" "$COMPILES") || die "Its C compiler does not work: ${reason##*$'\n'}" \
+        "Next: install one, or name it: CC=/path/to/cc make setup"
 }
 
 # ---------------------------------------------------------------- the virtual environment
 make_venv() {
-    [[ $python != "$VENV/bin/python" ]] || return 0
-    begin "making $VENV from $python, with its packages visible"
+    begin "making $VENV from $python"
+    if [[ $way == wheel ]]; then
+        "$python" -m venv --clear "$VENV"
+        return
+    fi
     "$python" -m venv --clear --system-site-packages "$VENV"
     # Where $python is itself a virtual environment (containers), its packages would not be seen.
     "$python" -c 'import site, sys
@@ -159,49 +284,59 @@ if sys.prefix != sys.base_prefix: print(*site.getsitepackages(), sep="\n")' >"$V
 }
 
 install_cutsim() {
+    local module what=(-e ".[dev]")
     begin "installing cutsim and its Python dependencies into $VENV"
-    # The compiled packages beside dolfinx stay as they are.
-    "$VENV/bin/python" - >"$VENV/constraints.txt" <<'PY'
+    : >"$VENV/constraints.txt"
+    if [[ $way == wheel ]]; then
+        what=(-e ".[dolfinx,dev]")
+    else
+        # The compiled packages beside dolfinx stay as they are.
+        "$VENV/bin/python" - >"$VENV/constraints.txt" <<'PY'
 from importlib.metadata import distributions
 fixed = {"numpy", "scipy", "mpi4py", "petsc4py", "fenics-dolfinx"}
 print(*sorted({f"{d.name}=={d.version}" for d in distributions() if d.name.lower() in fixed}), sep="\n")
 PY
-    local module extra=()
-    for module in gmsh meshio; do
-        "$VENV/bin/python" -c "import $module" 2>/dev/null || extra+=("$module")
-    done
-    "$VENV/bin/python" -m pip install --quiet --disable-pip-version-check -c "$VENV/constraints.txt" \
-        "${extra[@]}" -e '.[dev]'
+        for module in gmsh meshio; do
+            "$VENV/bin/python" -c "import $module" 2>/dev/null || what+=("$module")
+        done
+    fi
+    "$VENV/bin/python" -m pip install --quiet --disable-pip-version-check -c "$VENV/constraints.txt" "${what[@]}" ||
+        die "pip did not succeed; its own message is above. Where it found no package or no connection, this machine" \
+            "cannot reach the package index: behind a proxy set HTTPS_PROXY, with a mirror set PIP_INDEX_URL." \
+            "Next: make setup"
 }
 
 check() {
+    local reason
     begin "checking the installation"
-    "$VENV/bin/python" -c 'import cutsim, dolfinx, gmsh, meshio, petsc4py, pyvista'
-    command -v mpirun >/dev/null || say "NOTE: no mpirun: only one rank can be used"
-    "$VENV/bin/python" - >/dev/null 2>&1 <<'PY' || say "NOTE: pyvista cannot draw off screen: no pictures"
+    reason=$(ask "$PWD/$VENV/bin/python" "from mpi4py import MPI; import cutsim, gmsh, meshio, pyvista") ||
+        die "$VENV does not work: ${reason##*$'\n'}" "Next: rm -rf $VENV && make setup"
+    ask "$PWD/$VENV/bin/python" '
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
 plotter.add_mesh(pyvista.Sphere(), color="red")
-assert plotter.screenshot(return_img=True).std() > 0
-PY
+assert plotter.screenshot(return_img=True).std() > 0' >/dev/null || say "NOTE: pyvista cannot draw off screen: no pictures"
 }
 
-fingerprint=$(cat pyproject.toml scripts/setup.sh | cksum)
-if [[ -x $VENV/bin/python && -f $STAMP && $(<"$STAMP") == "$fingerprint" ]]; then
-    touch "$STAMP"
-    exit 0
+[[ ${DOLFINX:=} =~ ^(|wheel|system)$ ]] || die "DOLFINX=$DOLFINX is neither wheel nor system." "Next: make setup"
+sources=$(cat pyproject.toml scripts/setup.sh scripts/python.sh | cksum)
+if venv_is_whole && venv_is_wanted; then
+    [[ $(stamped sources) != "$sources" ]] || exit 0
+    way=$(stamped way)
+    python=$(stamped python)
+    say "$VENV is brought up to date; its dolfinx ($way) and its Python ($python) stay."
+    rm "$STAMP"
+else
+    choose
+    case $way in
+        wheel) say "$VENV will be made from $python ($found), with dolfinx 0.11 from its wheel (no root, some 500 MB)." ;;
+        system) say "$VENV will be made from $python, with the $found it has." ;;
+    esac
+    say "To choose otherwise: DOLFINX=wheel|system or PYTHON=/path/to/python3 before make."
+    complete_system
+    make_venv
 fi
-python=""
-say "cutsim needs dolfinx 0.9 from the system and puts the rest into $VENV"
-if ! find_python; then
-    command -v apt-get >/dev/null || explain
-    install_packages
-    find_python || explain
-elif [[ $(dpkg-query -S "$(readlink -f "$python")" 2>/dev/null) && -n $(missing_packages) ]]; then
-    if can_be_root; then install_packages; else say "NOTE: recommended, not installed: $(missing_packages | xargs)"; fi
-fi
-make_venv
 install_cutsim
 check
-echo "$fingerprint" >"$STAMP"
+printf '%s\n' "way=$way" "python=$python" "place=$PWD" "sources=$sources" >"$STAMP"
 say "done"

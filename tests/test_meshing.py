@@ -11,7 +11,7 @@ from dolfinx import fem
 from dolfinx.mesh import CellType, GhostMode
 from mpi4py import MPI
 
-from cutsim.fields.meshing import TaggedMesh, read_geo, read_msh, tag_mesh
+from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_msh, tag_mesh
 from cutsim.fields.sizes import facet_size, global_range, normal_size
 
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -284,6 +284,12 @@ def test_bad_markers_are_refused():
         tag_mesh(mesh, everything | corner, {})
     with pytest.raises(ValueError, match=r"both have \['all'\]"):
         tag_mesh(mesh, everything, everything)
+
+
+def test_geometries_are_found_by_name():
+    assert geometry("block").samefile(MESHES / "block.geo")
+    with pytest.raises(ValueError, match="name = 'common' is no geometry of cutsim; known: block, blocks, cylinders, dcb"):
+        geometry("common")
 
 
 @pytest.mark.parametrize("cell", [CellType.triangle, CellType.quadrilateral])

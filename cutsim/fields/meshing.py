@@ -24,6 +24,10 @@ from cutsim.base.compat import model_to_mesh
 
 logger = logging.getLogger(__name__)
 
+# The geometries that come with cutsim: inside the installed package, beside it in a checkout.
+_PACKAGE = Path(__file__).parents[1]
+_GEOMETRIES = next((path for path in (_PACKAGE / "meshes", _PACKAGE.parent / "meshes") if path.is_dir()), _PACKAGE)
+
 Marker = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 
 
@@ -66,6 +70,21 @@ class TaggedMesh:
             kind = "cells" if tags.dim == self.mesh.topology.dim else "facets"
             raise ValueError(f"name = {name!r} is no group of {kind}; known: {', '.join(known) or 'none'}")
         return tags.find(known[name])
+
+
+def geometry(name: str) -> Path:
+    """Find a parametrised gmsh geometry that comes with cutsim, for ``read_geo``.
+
+    Args:
+        name: Its name, such as ``"block"``; the file says at its head what is drawn and which parameters it has.
+
+    Raises:
+        ValueError: If there is none of this name.
+    """
+    known = {path.stem: path for path in sorted(_GEOMETRIES.glob("*.geo")) if path.stem != "common"}  # macros
+    if name not in known:
+        raise ValueError(f"name = {name!r} is no geometry of cutsim; known: {', '.join(known) or 'none'}")
+    return known[name]
 
 
 def read_geo(
