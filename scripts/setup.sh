@@ -24,7 +24,7 @@ PICTURE_PACKAGES=(libegl1 libgl1-mesa-dri) # those draw off screen
 # virtual environments, pictures. apt is given the list as a whole, so that versions fit each other.
 SYSTEM_PACKAGES=(
     python3-dolfinx-real python3-petsc4py-real python3-gmsh python3-meshio python3-matplotlib python3-pytest
-    gcc libc6-dev libpython3-dev mpi-default-bin libopenblas0-pthread
+    gcc libc6-dev mpi-default-bin libopenblas0-pthread
     python3-venv python3-pip-whl python3-setuptools-whl
     "${PICTURE_PACKAGES[@]}"
 )
@@ -96,7 +96,7 @@ apt() {
 refresh() {
     can_be_root || return 0
     begin "refreshing the package lists (apt-get update)"
-    apt update || say "some lists could not be refreshed; going on with those there are"
+    apt update >/dev/null || say "some lists could not be refreshed; going on with those there are"
 }
 
 # install PURPOSE RELEASE PACKAGES...: RELEASE is a suite to prefer, or empty.
@@ -112,11 +112,12 @@ install() {
     removed=$(awk '/^Remv/ { printf " %s", $2 }' <<<"$plan")
     say "apt-get will install $purpose: $*"
     say "  in all $(grep -cE '^Inst \S+ \(' <<<"$plan") packages new," \
-        "$(grep -cE '^Inst \S+ \[' <<<"$plan") upgraded; removed:${removed:- none}"
+        "$(grep -cE '^Inst \S+ \[' <<<"$plan") upgraded; removed:${removed:- none}. This may take some minutes."
     confirm
+    # Its errors are shown, not the names of what it unpacks.
     # shellcheck disable=SC2086
     apt $release -y -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold \
-        install --no-install-recommends "$@"
+        install --no-install-recommends "$@" >/dev/null
 }
 
 offers() {
@@ -143,7 +144,7 @@ add_trixie() {
     printf 'Package: *\nPin: release n=trixie\nPin-Priority: 100\n' |
         as_root tee "/etc/apt/preferences.d/$name" >/dev/null
     echo "deb $mirror trixie main" | as_root tee "/etc/apt/sources.list.d/$name.list" >/dev/null
-    apt update
+    apt update >/dev/null
 }
 
 # python3.N with what Debian splits off from it.
@@ -310,7 +311,8 @@ check() {
     local reason
     begin "checking the installation"
     reason=$(ask "$PWD/$VENV/bin/python" "from mpi4py import MPI; import cutsim, gmsh, meshio, pyvista") ||
-        die "$VENV does not work: ${reason##*$'\n'}" "Next: rm -rf $VENV && make setup"
+        die "$VENV does not work: ${reason##*$'\n'}" \
+            "Next, with another Python or another dolfinx: PYTHON=/path/to/python3 make setup, DOLFINX=wheel|system make setup"
     ask "$PWD/$VENV/bin/python" '
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
