@@ -12,6 +12,7 @@ set -Eeuo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 task=setup
+refreshed=""
 VENV=.venv
 STAMP=$VENV/.setup-stamp
 # A .venv that is active is what to make, not what to make it from.
@@ -94,14 +95,15 @@ apt() {
 }
 
 refresh() {
-    can_be_root || return 0
+    [[ -z $refreshed ]] && can_be_root || return 0
+    refreshed=yes
     begin "refreshing the package lists (apt-get update)"
     apt update >/dev/null || say "some lists could not be refreshed; going on with those there are"
 }
 
 # install PURPOSE RELEASE PACKAGES...: RELEASE is a suite to prefer, or empty.
 install() {
-    local plan removed purpose=$1 release=${2:+-o APT::Default-Release=$2}
+    local plan purpose=$1 release=${2:+-o APT::Default-Release=$2}
     shift 2
     step="installing $purpose"
     can_be_root || die "This needs root rights, or sudo that does not ask when there is no terminal." \
@@ -109,10 +111,11 @@ install() {
         "  apt-get update && apt-get install --no-install-recommends $*" "then: make setup"
     # shellcheck disable=SC2086 # an empty release is no argument
     plan=$(apt-get $release -s install --no-install-recommends "$@")
-    removed=$(awk '/^Remv/ { printf " %s", $2 }' <<<"$plan")
     say "apt-get will install $purpose: $*"
-    say "  in all $(grep -cE '^Inst \S+ \(' <<<"$plan") packages new," \
-        "$(grep -cE '^Inst \S+ \[' <<<"$plan") upgraded; removed:${removed:- none}. This may take some minutes."
+    awk '/^Inst/ { if ($3 ~ /^\[/) upgraded++; else added++ }
+        /^Remv/ { removed = removed " " $2 }
+        END { printf "[setup]   in all %d packages new, %d upgraded; removed:%s. This may take some minutes.\n",
+            added, upgraded, removed ? removed : " none" }' <<<"$plan"
     confirm
     # Its errors are shown, not the names of what it unpacks.
     # shellcheck disable=SC2086
