@@ -317,7 +317,8 @@ check() {
         die "$VENV does not work: ${reason##*$'\n'}" \
             "Next, with another Python or another dolfinx: PYTHON=/path/to/python3 make setup, DOLFINX=wheel|system make setup"
     ask "$PWD/$VENV/bin/python" '
-import pyvista
+import ctypes, pyvista
+ctypes.CDLL("libEGL.so.1")
 plotter = pyvista.Plotter(off_screen=True, window_size=(64, 64))
 plotter.add_mesh(pyvista.Sphere(), color="red")
 assert plotter.screenshot(return_img=True).std() > 0' >/dev/null || say "NOTE: pyvista cannot draw off screen: no pictures"

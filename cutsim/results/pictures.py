@@ -5,7 +5,10 @@ Pictures are extras: where pyvista is missing or cannot draw, that is logged as 
 
 from __future__ import annotations
 
+import ctypes
 import logging
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -293,6 +296,10 @@ def _stage(title: str) -> pyvista.Plotter:
     """A white stage with a strip for the colour bars below it."""
     import pyvista
 
+    # Without a display VTK would try X first and complain; without libEGL it would then end the process.
+    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW"))):
+        ctypes.CDLL("libEGL.so.1")
+        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
     plotter = pyvista.Plotter(
         off_screen=True, window_size=(1600, 1000), shape=(2, 1), row_weights=(0.87, 0.13), border=False,
         lighting="light kit",
