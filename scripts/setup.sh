@@ -335,7 +335,7 @@ if venv_is_whole && venv_is_wanted; then
 else
     choose
     case $way in
-        wheel) say "$VENV will be made from $python ($found), with dolfinx 0.11 from its wheel (no root, some 500 MB)." ;;
+        wheel) say "$VENV will be made from $python ($found), with dolfinx 0.11 from its wheel (no root, some 400 MB)." ;;
         system) say "$VENV will be made from $python, with the $found it has." ;;
     esac
     say "To choose otherwise: DOLFINX=wheel|system or PYTHON=/path/to/python3 before make."
