@@ -221,12 +221,17 @@ explain() {
 }
 
 # ---------------------------------------------------------------- what compiles, meshes and draws
+from_package() { dpkg-query -S "$(readlink -f "$python")" &>/dev/null; }
+
 # Packages of Debian and Ubuntu without which $python can do nothing here.
 essentials() {
-    local name=python3
-    ! from_package || name=$(basename "$(readlink -f "$python")")
-    ask "$python" "$MAKES_VENV" >/dev/null || python_packages "$name"
-    ask "$python" "$COMPILES" >/dev/null || echo "gcc libc6-dev lib$name-dev"
+    local name headers=""
+    if from_package; then
+        name=$(basename "$(readlink -f "$python")")
+        headers=lib$name-dev
+        ask "$python" "$MAKES_VENV" >/dev/null || python_packages "$name"
+    fi
+    ask "$python" "$COMPILES" >/dev/null || echo gcc libc6-dev "$headers"
     if [[ $way == wheel ]] || ! ask "$python" "import gmsh" >/dev/null; then
         ask "$python" "$LOADS_LIBRARIES" >/dev/null || echo "${LIBRARY_PACKAGES[*]}"
     fi
@@ -234,6 +239,7 @@ essentials() {
 
 # Those for pictures, and for speed where dolfinx is Debian's.
 recommended() {
+    local package
     if [[ $way == system ]] && from_package; then
         for package in "${SYSTEM_PACKAGES[@]}"; do
             [[ $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) == installed ]] || echo "$package"
@@ -243,32 +249,25 @@ recommended() {
     fi
 }
 
-from_package() { dpkg-query -S "$(readlink -f "$python")" &>/dev/null; }
-
 complete_system() {
     local packages extra release="" reason
     read -ra packages < <(essentials | xargs)
     read -ra extra < <(recommended | xargs)
-    ((${#packages[@]} + ${#extra[@]})) || return 0
-    if ! command -v apt-get >/dev/null; then
-        ((${#packages[@]})) || return 0
-        die "A C compiler, Python's headers or shared libraries of gmsh are missing." "Next, on Fedora:" \
-            "  sudo dnf install ${FEDORA_PACKAGES[*]}" "or their like elsewhere, then: make setup"
-    fi
-    if can_be_root; then
+    if ((${#packages[@]} == 0)); then
+        ((${#extra[@]} == 0)) || say "NOTE: recommended, not installed: ${extra[*]}"
+    elif command -v apt-get >/dev/null; then
         [[ $way == wheel ]] || ! from_package || packages=("${SYSTEM_PACKAGES[@]}")
         # Only there has Debian 12 what belongs to a newer Python.
         [[ ${packages[*]} != *python3.1[2-9]-venv* ]] || ! on_bookworm || release=trixie
         refresh
         install "what is missing beside $python" "$release" "${packages[@]}" "${extra[@]}"
-    elif ((${#packages[@]})); then
-        install "what is missing beside $python" "" "${packages[@]}" "${extra[@]}"
     else
-        say "NOTE: recommended, not installed: ${extra[*]}"
+        die "A C compiler, Python's headers or shared libraries of gmsh are missing." "Next, on Fedora:" \
+            "  sudo dnf install ${FEDORA_PACKAGES[*]}" "or their like elsewhere, then: make setup"
     fi
     step="checking $python"
     reason=$(ask "$python" "$MAKES_VENV") || die "It makes no virtual environments: ${reason##*$'\n'}" \
-        "Next: name another Python: PYTHON=/path/to/python3 make setup"
+        "Next, with another Python: PYTHON=/path/to/python3 make setup"
     reason=$(ask "$python" "$COMPILES") || die "Its C compiler does not work: ${reason##*$'\n'}" \
         "Next: install one, or name it: CC=/path/to/cc make setup"
 }
