@@ -3,6 +3,8 @@
 
 # An empty HOME would put caches below /; without one the home of the account is taken.
 [[ ${HOME:-} ]] || unset HOME
+# Interpreters are called from elsewhere, so a path to one has to be whole.
+[[ ${PYTHON:-} != */* || $PYTHON == /* ]] || PYTHON=$PWD/$PYTHON
 
 step="starting"
 python=""
@@ -26,8 +28,9 @@ trap 'die "This command did not succeed: $BASH_COMMAND" \
 
 # dolfinx is there. MPI comes first: the dolfinx of the wheel needs it loaded.
 HAS_DOLFINX='
-import sys
+import importlib.util, sys
 assert sys.version_info >= (3, 11), f"it is Python {sys.version.split()[0]}, older than 3.11"
+assert importlib.util.find_spec("dolfinx"), "it has no dolfinx"
 from mpi4py import MPI
 import dolfinx, numpy, petsc4py
 assert dolfinx.__version__.startswith(("0.9.", "0.10.", "0.11.")), f"its dolfinx is {dolfinx.__version__}"
@@ -62,7 +65,7 @@ first_that() {
             { read -r python && read -r found; } < <(tail -n 2 <<<"$answer")
             return 0
         fi
-        refused+=("$candidate: ${answer##*$'\n'}")
+        refused+=("$candidate: $(tail -n 1 <<<"$answer" | sed -E 's/^(AssertionError|[^ ]+: line [0-9]+): //')")
     done
     return 1
 }
@@ -70,15 +73,18 @@ first_that() {
 # All on the PATH, as the first may be a shim of pyenv that leads nowhere.
 on_path() { type -aP "$1" || true; }
 
-find_system_python() {
-    first_that "$HAS_DOLFINX" < <(
-        if [[ ${PYTHON:-} ]]; then
-            on_path "$PYTHON"
-        else
-            { on_path python3 && echo /usr/bin/python3; } | awk '!seen[$0]++'
-        fi
-    )
+# PYTHON where it is given, else what a command finds.
+candidates() {
+    if [[ ${PYTHON:-} ]]; then
+        type -P "$PYTHON" || echo "$PYTHON"
+    else
+        "$@" | awk '!seen[$0]++'
+    fi
 }
+
+find_system_python() { first_that "$HAS_DOLFINX" < <(candidates system_pythons); }
+
+system_pythons() { on_path python3 && echo /usr/bin/python3; }
 
 # The tested version first.
 newer_pythons() {
@@ -107,6 +113,6 @@ wheel_fits_machine() {
 find_wheel_python() {
     local all
     wheel_fits_machine || return 1
-    all=$(if [[ ${PYTHON:-} ]]; then on_path "$PYTHON"; else newer_pythons | awk '!seen[$0]++'; fi)
+    all=$(candidates newer_pythons)
     first_that "$TAKES_WHEEL$MAKES_VENV" <<<"$all" || first_that "$TAKES_WHEEL" <<<"$all"
 }

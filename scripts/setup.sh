@@ -206,17 +206,17 @@ provide_python() {
 }
 
 explain() {
-    ((${#refused[@]} == 0)) || printf '[setup] %s\n' "${refused[@]}" | awk '!seen[$0]++' >&2
-    if [[ ${PYTHON:-} ]]; then
-        die "PYTHON=$PYTHON can be used neither for its dolfinx nor for the wheel${DOLFINX:+ (DOLFINX=$DOLFINX)}: see above." \
-            "Next: name another, or none: make setup"
-    fi
-    die "No Python here imports dolfinx 0.9, 0.10 or 0.11, none takes its wheel, and no package was found" \
-        "that would help${DOLFINX:+ with DOLFINX=$DOLFINX}. Next, one of these:" \
-        "  uv python install 3.13 && make setup           (no root; uv: pip install uv)" \
+    local other="uv python install 3.13 && make setup          (no root; uv: pip install uv)"
+    step="looking for dolfinx"
+    printf '[setup] %s\n' "${refused[@]}" | awk '!seen[$0]++' >&2
+    [[ -z ${PYTHON:-} ]] || die "PYTHON=$PYTHON cannot be used${DOLFINX:+ with DOLFINX=$DOLFINX}: see above." \
+        "Next: name another, or none: make setup"
+    [[ $DOLFINX != system ]] || other="DOLFINX=wheel make setup                      (no root)"
+    die "Nothing here has a dolfinx that can be used${DOLFINX:+ with DOLFINX=$DOLFINX}: see above. Next, one of these:" \
+        "  $other" \
         "  conda env create -f environment.yml && conda activate cutsim && make setup" \
         "  docker build -t cutsim . && docker run -it --rm cutsim" \
-        "  PYTHON=/path/to/python3 make setup             (one that is 3.12 or later, or imports dolfinx)" \
+        "  PYTHON=/path/to/python3 make setup            (one from 3.12 on, or one that imports dolfinx)" \
         "docs/install.md says more about each."
 }
 
