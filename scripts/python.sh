@@ -31,6 +31,7 @@ HAS_DOLFINX='
 import importlib.util, sys
 assert sys.version_info >= (3, 11), f"it is Python {sys.version.split()[0]}, older than 3.11"
 assert importlib.util.find_spec("dolfinx"), "it has no dolfinx"
+assert not importlib.util.find_spec("dolfinx_solver"), "its dolfinx is the wheel, which works in its own .venv only"
 from mpi4py import MPI
 import dolfinx, numpy, petsc4py
 assert dolfinx.__version__.startswith(("0.9.", "0.10.", "0.11.")), f"its dolfinx is {dolfinx.__version__}"
