@@ -1,5 +1,8 @@
 """Newton's order, augmented contact, and the same history on any number of ranks."""
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 import ufl
@@ -39,6 +42,17 @@ def pried_and_pressed(comm=MPI.COMM_WORLD, n=6, gdim=2, **options):
     supports.append(Support(b.state, edge, up, lambda t: 0.5 * t, name="pull"))
     terms = [b.solid(NeoHookean(E, NU)), b.crack(WEAK, contact=PenaltyContact(30.0)), ball]
     return Mechanics(b.state, terms, supports, **options)
+
+
+@pytest.mark.mpi
+def test_a_problem_that_is_dropped_is_freed():
+    """Else a loop over runs keeps every mesh and matrix, until MPI has no communicator left."""
+    mechanics = pried_and_pressed()
+    run(mechanics, 0.1, StepControl.fixed(0.1))
+    kept = [weakref.ref(thing) for thing in (mechanics, mechanics.problem, mechanics.state, mechanics.terms[1])]
+    del mechanics
+    gc.collect()
+    assert [reference() for reference in kept] == 4 * [None]
 
 
 def test_newton_converges_quadratically():

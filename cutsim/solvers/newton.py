@@ -1,8 +1,9 @@
 """The nonlinear problem F(u; v) = 0: one Newton solver with a preconditioner that looks after itself."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
+from weakref import WeakMethod
 
 import numpy as np
 import ufl
@@ -45,6 +46,22 @@ _SENTENCES = {
     _Reason.DIVERGED_LINEAR_SOLVE: "linear solver did not converge",
     _Reason.DIVERGED_DTOL: f"residual grew by more than {GROWTH:.0e}",
 }
+
+
+def _weakly(method: Callable[..., Any]) -> Callable[..., Any]:
+    """A method that PETSc may call and that does not keep its object alive.
+
+    Python cannot see what PETSc holds. A problem held there is never freed, nor are its matrices, spaces and
+    communicators, of which MPI has no more than some thousands: a loop over runs ends when they are used up.
+    """
+    reference = WeakMethod(method)
+
+    def call(*arguments: Any) -> Any:
+        alive = reference()
+        assert alive is not None, "the solver has outlived its problem"
+        return alive(*arguments)
+
+    return call
 
 
 @dataclass(frozen=True)
@@ -148,6 +165,8 @@ class NonlinearProblem:
     def _create_vectors(self) -> None:
         mesh = self.u.function_space.mesh
         self._comm: MPI.Comm = mesh.comm
+        # on several ranks PETSc frees what Python has dropped only where all ranks meet
+        PETSc.garbage_cleanup(self._comm)
         # SNES iterates on a vector of its own, displacement first, then multipliers: were it that of u, line searches
         # would spoil their own start.
         self._x = PETSc.Vec().createWithArray(self._unknowns(), comm=self._comm)
@@ -162,10 +181,10 @@ class NonlinearProblem:
     def _create_snes(self, rtol: float) -> None:
         self._snes = PETSc.SNES().create(self._comm)
         self._snes.setOptionsPrefix(self._options.prefix)
-        self._snes.setFunction(self._evaluate_residual, self._f)
+        self._snes.setFunction(_weakly(self._evaluate_residual), self._f)
         self._set_matrix()
-        self._snes.setConvergenceTest(self._test)
-        self._snes.setLineSearchPreCheck(self._check_step)
+        self._snes.setConvergenceTest(_weakly(self._test))
+        self._snes.setLineSearchPreCheck(_weakly(self._check_step))
         # stol = 0: a small step is no sign of equilibrium.
         self._snes.setTolerances(rtol=rtol, stol=0.0, max_it=25)
         self._options.default({"snes_linesearch_type": LINE_SEARCHES[0], **compat.LINE_SEARCH_OPTIONS})
@@ -307,7 +326,7 @@ class NonlinearProblem:
 
     def _set_matrix(self) -> None:
         A = self._multipliers.around(self._tangent.A, symmetric=self._symmetric)
-        self._snes.setJacobian(self._evaluate_tangent, A)
+        self._snes.setJacobian(_weakly(self._evaluate_tangent), A)
 
     def _unknowns(self) -> NDArray[np.float64]:
         return np.concatenate([self.u.x.array[: self._forces.n], self._multipliers.values])
