@@ -1,8 +1,8 @@
 # Sourced by setup.sh and dist.sh, which set $task: messages, and the search for a Python to build upon.
 # shellcheck shell=bash disable=SC2034,SC2154 # shared variables
 
-# An empty HOME would put caches below /; without one the home of the account is taken.
-[[ ${HOME:-} ]] || unset HOME
+# With an empty HOME caches would lie below /: take the account's.
+[[ ${HOME:-} ]] || { unset HOME && export HOME=~; }
 # Interpreters are called from elsewhere, so a path to one has to be whole.
 [[ ${PYTHON:-} != */* || $PYTHON == /* ]] || PYTHON=$PWD/$PYTHON
 
