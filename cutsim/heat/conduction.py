@@ -127,7 +127,7 @@ def _conductivity(conductivity: float | ArrayLike, gdim: int) -> NDArray[np.floa
     matrix[:gdim, :gdim] = k * np.eye(gdim) if k.ndim == 0 else k
     require("conductivity", conductivity, bool(np.all(np.isfinite(matrix))), "finite")
     require("conductivity", conductivity, np.allclose(matrix, matrix.T), "symmetric")
-    require("conductivity", conductivity, np.linalg.eigvalsh(matrix).min() >= 0, ">= 0")
+    require("conductivity", conductivity, bool(np.linalg.eigvalsh(matrix).min() >= 0), ">= 0")
     return matrix
 
 

@@ -80,4 +80,4 @@ def require_axes(axes: tuple[Direction, Direction]) -> None:
         require_direction("axes", axis)
     if all(isinstance(a, tuple) for a in axes):
         first, second = (np.array([*a, 0.0][:3]) / np.linalg.norm(a) for a in axes)
-        require("axes", axes, abs(first @ second) < 1e-9, "at right angles")
+        require("axes", axes, bool(abs(first @ second) < 1e-9), "at right angles")
