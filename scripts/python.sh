@@ -96,7 +96,7 @@ newer_pythons() {
         for root in "${PYENV_ROOT:-}" "${HOME:-}/.pyenv" "$(dirname "$(dirname "$(type -P pyenv)")")"; do
             compgen -G "$root/versions/$version.*/bin/python" | sort -rV || true
         done
-        if type -P uv >/dev/null; then uv python find --quiet --system --no-python-downloads "$version" || true; fi
+        if type -P uv >/dev/null; then uv python find --system --no-python-downloads "$version" || true; fi
     done 2>/dev/null
     on_path python3
 }

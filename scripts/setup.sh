@@ -60,7 +60,8 @@ confirm() {
     attended || return 0
     local answer
     read -rp "[setup] Go on? [Y/n] " answer
-    [[ $answer != [nN]* ]] || die "Stopped on request; nothing of this step was changed."
+    [[ $answer != [nN]* ]] || die "Stopped on request; nothing of this step was changed." \
+        "Next, with a Python of your own: PYTHON=/path/to/python3 make setup"
 }
 
 # ---------------------------------------------------------------- the .venv there is
