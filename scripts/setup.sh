@@ -111,7 +111,8 @@ install() {
         "Next: let an administrator run" \
         "  apt-get update && apt-get install --no-install-recommends $*" "then: make setup"
     # shellcheck disable=SC2086 # an empty release is no argument
-    plan=$(apt-get $release -s install --no-install-recommends "$@")
+    plan=$(apt-get $release -s install --no-install-recommends "$@") || die \
+        "apt-get finds no way to install $*; its own message is above." "Next: apt-get update, then: make setup"
     say "apt-get will install $purpose: $*"
     awk '/^Inst/ { if ($3 ~ /^\[/) upgraded++; else added++ }
         /^Remv/ { removed = removed " " $2 }
@@ -121,7 +122,8 @@ install() {
     # Its errors are shown, not the names of what it unpacks.
     # shellcheck disable=SC2086
     apt $release -y -o Dpkg::Options::=--force-confdef -o Dpkg::Options::=--force-confold \
-        install --no-install-recommends "$@" >/dev/null
+        install --no-install-recommends "$@" >/dev/null || die "apt-get did not succeed; its own message is above." \
+        "Next: put that right (apt-get --fix-broken install, where an installation was cut short), then: make setup"
 }
 
 offers() {
@@ -156,7 +158,6 @@ python_packages() { echo "$1 $1-venv lib$1-dev python3-pip-whl python3-setuptool
 
 # ---------------------------------------------------------------- where dolfinx comes from
 choose() {
-    local packages
     step="looking for dolfinx"
     if [[ ${DOLFINX:-} != wheel ]] && find_system_python; then
         way=system
