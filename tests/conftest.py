@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import mpi4py.MPI  # noqa: F401  # before dolfinx, as in cutsim
 import numpy as np
 from dolfinx import mesh
 from mpi4py import MPI

@@ -26,6 +26,9 @@ from cutsim.base.units import Units
 
 _TAKEN = ("displacement", "fields")
 
+# ADIOS2, which writes the fields, looks for its settings there and does not survive if there is none
+os.environ.setdefault("HOME", str(Path.home()))
+
 
 class _Closing:
     """A context manager that closes itself at the end."""
