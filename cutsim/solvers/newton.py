@@ -1,7 +1,9 @@
 """The nonlinear problem F(u; v) = 0: one Newton solver with a preconditioner that looks after itself."""
 
+import gc
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import count
 from typing import Any, Self
 from weakref import WeakMethod
 
@@ -31,6 +33,8 @@ LINE_SEARCHES = ("l2", "bt", "basic")
 ROUNDING = 1e-14
 #: A prescribed displacement holds when it is met within this fraction of max |u| + h.
 BC_ROUNDING = 1e-12
+# problems after which what is left of dropped ones is looked for
+_COLLECT = 16
 #: Growth of the residual at which an iteration is given up.
 GROWTH = 1e6
 
@@ -46,6 +50,20 @@ _SENTENCES = {
     _Reason.DIVERGED_LINEAR_SOLVE: "linear solver did not converge",
     _Reason.DIVERGED_DTOL: f"residual grew by more than {GROWTH:.0e}",
 }
+
+
+_made = count(1)
+
+
+def _free_dropped(comm: MPI.Comm) -> None:
+    """Free what earlier problems have left, to be called where all ranks meet. Collective.
+
+    Objects that refer to each other wait for Python's collector, which does not know that their communicators are
+    few; and on several ranks PETSc only notes what Python has dropped.
+    """
+    if next(_made) % _COLLECT == 0:
+        gc.collect()
+    PETSc.garbage_cleanup(comm)
 
 
 def _weakly(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -165,8 +183,7 @@ class NonlinearProblem:
     def _create_vectors(self) -> None:
         mesh = self.u.function_space.mesh
         self._comm: MPI.Comm = mesh.comm
-        # on several ranks PETSc frees what Python has dropped only where all ranks meet
-        PETSc.garbage_cleanup(self._comm)
+        _free_dropped(self._comm)
         # SNES iterates on a vector of its own, displacement first, then multipliers: were it that of u, line searches
         # would spoil their own start.
         self._x = PETSc.Vec().createWithArray(self._unknowns(), comm=self._comm)
