@@ -79,6 +79,12 @@ def make_blocks(gdim=2, n=2, comm=MPI.COMM_WORLD, cell=None):
     return Blocks(State(cracked_space(domain, ("Lagrange", 1, (gdim,)), facets)), facets, lower, upper)
 
 
+def remember(crack, opening, sliding=0.0):
+    """Let the bond of a crack have been open and slid so far at all points."""
+    secants = np.minimum(crack.law.secants(0.0, 0.0), crack.law.secants(opening, sliding))
+    crack.points.set(crack.history.secants, np.broadcast_to(secants, (*crack.points.weights.shape, 2)))
+
+
 def rotation(gdim, angle):
     """Rotation matrix, in 3-D about a skew axis (Rodrigues' formula)."""
     if gdim == 2:

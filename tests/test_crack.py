@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, EXPONENTIAL, NU, PPR, E, history, make_blocks, rotation
+from conftest import BILINEAR, EXPONENTIAL, NU, PPR, E, history, make_blocks, remember, rotation
 from dolfinx import fem, la
 
 from cutsim.analysis.mechanics import Mechanics
@@ -16,48 +16,49 @@ from cutsim.materials.rubbers import MooneyRivlin
 PENALTY = PenaltyContact(500.0)
 
 
-def exponential(law, sliding, opening, largest):
-    """Thesis 4.20 and 4.24, written anew: tractions and the new history."""
-    beta = np.sqrt(law.toughness[1] / law.toughness[0])
-    effective = np.hypot(max(opening, 0), beta * sliding)
-    largest = max(largest, effective)
-    r = largest / effective if effective else 1.0
-    n, t = r * max(opening, 0) / law.eps_n, r * sliding / law.eps_t
+def exponential(law, sliding, opening):
+    """Thesis 4.20, written anew: tractions on the envelope."""
+    n, t = opening / law.eps_n, sliding / law.eps_t
     T_n = law.t_n * n * np.exp(1 - n - t**2)
     T_t = 2 * np.sqrt(np.e / 2) * law.t_t * t * (1 + n) * np.exp(-n - t**2)
-    return T_t / r, T_n / r + PENALTY.stiffness * min(opening, 0), largest
+    return T_t, T_n
 
 
-def bilinear(law, sliding, opening, largest):
-    """Camanho, Davila and Turon, written anew: tractions and the largest damage."""
-    jump = np.hypot(sliding, max(opening, 0))
-    B = (sliding / jump) ** 2 if jump else 0.0
+def bilinear(law, sliding, opening):
+    """Camanho, Davila and Turon, written anew: tractions on the envelope."""
+    jump = np.hypot(sliding, opening)
+    B = (sliding / jump) ** 2
     onset = np.sqrt(law.t_n**2 + (law.t_t**2 - law.t_n**2) * B**law.eta) / law.penalty
     final = 2 * (law.G_I + (law.G_II - law.G_I) * B**law.eta) / (law.penalty * onset)
     d = np.clip(final * (jump - onset) / (jump * (final - onset)), 0, 1) if jump > onset else 0.0
-    k = (1 - max(d, largest)) * law.penalty
-    return k * sliding, k * max(opening, 0) + PENALTY.stiffness * min(opening, 0), max(d, largest)
+    return (1 - d) * law.penalty * sliding, (1 - d) * law.penalty * opening
 
 
-def ppr(law, sliding, opening, largest):
-    """Park, Paulino and Roesler (2009), as printed: tractions and the new history."""
-    beta = np.sqrt(law.toughness[1] / law.toughness[0])
-    effective = np.hypot(max(opening, 0), beta * sliding)
-    largest = max(largest, effective)
-    r = largest / effective if effective else 1.0
+def ppr(law, sliding, opening):
+    """Park, Paulino and Roesler (2009), as printed: tractions on the envelope."""
     (d_n, d_t), phi_n, phi_t = law.final, law.G_I, law.G_II
     m = law.alpha * (law.alpha - 1) * law.peak_n**2 / (1 - law.alpha * law.peak_n**2)
     n = law.beta * (law.beta - 1) * law.peak_t**2 / (1 - law.beta * law.peak_t**2)
     gamma_n, gamma_t = (law.alpha / m) ** m, (law.beta / n) ** n
     gamma_n, gamma_t = (gamma_n, -phi_t * gamma_t) if phi_n < phi_t else (-phi_n * gamma_n, gamma_t)
-    x, y = r * max(opening, 0) / d_n, r * abs(sliding) / d_t
+    x, y = opening / d_n, sliding / d_t
     f = gamma_n * (1 - x) ** law.alpha * (m / law.alpha + x) ** m if x < 1 else 0.0
     g = gamma_t * (1 - y) ** law.beta * (n / law.beta + y) ** n if y < 1 else 0.0
     across, along = g + max(phi_t - phi_n, 0), f + max(phi_n - phi_t, 0)
     # f' and g', zero where the other mode has broken the bond
     df = f * (m / (m / law.alpha + x) - law.alpha / (1 - x)) / d_n if x < 1 and across * f < 0 else 0.0
     dg = g * (n / (n / law.beta + y) - law.beta / (1 - y)) / d_t if y < 1 and along * g < 0 else 0.0
-    return np.sign(sliding) * dg * along / r, df * across / r + PENALTY.stiffness * min(opening, 0), largest
+    return dg * along, df * across
+
+
+def follow(envelope, law, jump, smallest):
+    """Tractions at a jump (sliding, opening) with the smallest secants so far, and the new ones (theory §3.2)."""
+    sliding, opening = jump
+    # a secant has a limit at zero, found a little beside it
+    beside = max(abs(sliding), 1e-7 * law.opening), max(opening, 1e-7 * law.opening)
+    smallest = np.minimum(smallest, np.divide(envelope(law, *beside), beside))
+    shear, pull = smallest * (sliding, max(opening, 0))
+    return (shear, pull + PENALTY.stiffness * min(opening, 0)), smallest
 
 
 # waypoints (sliding, opening) in units of the characteristic openings: load, unload, press, load again, break
@@ -92,18 +93,16 @@ def drag(law, waypoints, steps=150, gdim=2, **options):
 @pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize("law", LAWS)
 def test_two_boxes_follow_the_law(law, loop, gdim):
-    law, reference, scale = LAWS[law]
+    law, envelope, scale = LAWS[law]
     rows, _ = drag(law, np.array(LOOPS[loop]) * scale, steps=60, gdim=gdim)
     normal = "xyz"[gdim - 1]
-    largest = 0.0
+    smallest = np.full(2, np.inf)
     for i in range(len(rows["time"])):
         jump = rows["upper_x_displacement"][i], rows[f"upper_{normal}_displacement"][i]
-        shear, pull, largest = reference(law, *jump, largest)
+        (shear, pull), smallest = follow(envelope, law, jump, smallest)
         assert rows["upper_x_force"][i] == pytest.approx(shear, abs=1e-6 * law.strength)
         assert rows[f"upper_{normal}_force"][i] == pytest.approx(pull, abs=1e-6 * law.strength)
-    # below its history the exponential law has no potential in a jump that changes direction
-    if loop != "swerving":
-        assert (np.diff(rows["energy_fracture"]) > -1e-12).all()
+    assert (np.diff(rows["energy_fracture"]) >= 0).all()
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -171,7 +170,7 @@ class Forces:
 def damaged_body(gdim, material):
     b = make_blocks(gdim)
     crack = b.crack(EXPONENTIAL, contact=PENALTY)
-    crack.history.kappa.x.array[:] = 1.5 * EXPONENTIAL.eps_n
+    remember(crack, 1.5 * EXPONENTIAL.eps_n)
     return b, Forces(b.state, [crack, b.solid(material)])
 
 

@@ -124,14 +124,14 @@ def test_failed_steps_are_cut_and_leave_no_trace(monkeypatch):
         if state.time - state.time_old < 0.6 * SMALL.step or not 0.1 < state.time < 0.15:
             return outcome
         committed.append(
-            [a.copy() for a in (state.u_old.x.array, crack.history.kappa.x.array, mechanics._residual_old)]
+            [a.copy() for a in (state.u_old.x.array, crack.history.secants.x.array, mechanics._residual_old)]
         )
         state.u.x.array[:] = np.nan
         return replace(outcome, converged=False, message="made to fail")
 
     def rolling_back():
         rollback()
-        now = [state.u.x.array, crack.history.kappa.x.array, mechanics._residual_old]
+        now = [state.u.x.array, crack.history.secants.x.array, mechanics._residual_old]
         if committed:
             assert all(np.array_equal(a, b) for a, b in zip(now, committed.pop(), strict=True))
             committed.clear()

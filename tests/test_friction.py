@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import EXPONENTIAL, E, history, make_blocks, rotation
+from conftest import EXPONENTIAL, E, history, make_blocks, remember, rotation
 from dolfinx import fem
 from mpi4py import MPI
 
@@ -187,20 +187,20 @@ def test_augmentation_sticks_within_tolerance():
 @pytest.mark.parametrize("acts_on", ["broken", "contact", "thesis"])
 def test_where_friction_acts(acts_on, caplog):
     """Beside a bond: on its broken fraction, everywhere, or, as the thesis has it, under tension too."""
-    kappa, slide = 2.0 * EXPONENTIAL.eps_n, 0.1
+    past, slide = 2.0 * EXPONENTIAL.eps_n, 0.1
     for opening in (-DEPTH, 0.5 * EXPONENTIAL.eps_n):
         b = make_blocks()
         crack = b.crack(EXPONENTIAL, contact=PenaltyContact(NORMAL))
-        crack.points.set(crack.history.kappa, np.full_like(crack.points.weights, kappa))
+        remember(crack, past)
         friction = CrackFriction(crack, Coulomb(MU, 1e6), acts_on=acts_on)
         mechanics = Mechanics(b.state, [crack, friction], b.drive(b.lower, [0.0, 0.0]))
         b.move(lambda x: 0 * x, lambda x, o=opening: np.array([0 * x[0] + slide, 0 * x[0] + o]))
         b.state.begin(1.0)
         mechanics.evaluate()
         force = friction.slip.points.integral(friction.slip.values("traction")[..., 0] * friction.slip.values("share"))
-        broken = EXPONENTIAL.damage(kappa)[1]
-        stiff = float(EXPONENTIAL.stiffness(0.5 * EXPONENTIAL.eps_n, slide, kappa)[0])
-        tension = stiff * max(opening, 0.0) if acts_on == "thesis" else 0.0
+        k_n, k_t = np.minimum(EXPONENTIAL.secants(past, 0.0), EXPONENTIAL.secants(max(opening, 0.0), slide))
+        broken = EXPONENTIAL.damage(k_n, k_t)[1]
+        tension = k_n * max(opening, 0.0) if acts_on == "thesis" else 0.0
         limit = MU * (NORMAL * max(-opening, 0.0) + tension)
         expected = limit * (float(broken) if acts_on == "broken" else 1.0)
         assert abs(force) == pytest.approx(expected, rel=1e-6, abs=1e-12)

@@ -449,7 +449,7 @@ def memory(mechanics, pair):
     """Copies of all that a step changes."""
     arrays = [mechanics.state.u.x.array, pair.force(), list(pair.energies().values())]
     for p in pair.passes:
-        arrays += [p.history.kappa.x.array, p.history.multiplier.x.array, *p.history.trial.values()]
+        arrays += [p.history.secants.x.array, p.history.multiplier.x.array, *p.history.trial.values()]
         arrays += [p.slip.values(name) for name in ("slip", "traction", "dissipated")]
         arrays.append(p.kinematics._slid)
     return [np.array(a) for a in arrays]

@@ -59,7 +59,7 @@ def opening_blocks(comm=MPI.COMM_WORLD, law=WEAK):
 def snapshot(mechanics):
     """Every number that a step may change, as bytes."""
     state, (_, crack, plate, load) = mechanics.state, mechanics.terms
-    arrays = [state.u.x.array, state.u_old.x.array, crack.history.kappa.x.array, crack.history.multiplier.x.array]
+    arrays = [state.u.x.array, state.u_old.x.array, crack.history.secants.x.array, crack.history.multiplier.x.array]
     arrays += [plate.position.value, plate._position_old, load._scale.value]
     arrays += [s._value.value for s in mechanics.supports]
     arrays += [crack.point_values(name) for name in ("damage", "opening", "pressure", "dissipated")]

@@ -127,8 +127,3 @@ def safe_norm(vector: Expr, floor: float) -> Expr:
         floor: Positive number of the vector's unit, far below its relevant size.
     """
     return ufl.sqrt(ufl.dot(vector, vector) + floor**2) - floor
-
-
-def positive_part(x: Expr) -> Expr:
-    """Positive part ⟨x⟩ of a number."""
-    return ufl.conditional(ufl.gt(x, 0), x, 0.0)

@@ -1,19 +1,19 @@
 """Cohesive laws: traction against displacement jump on a crack that is opening (docs/theory.md §3.1, 3.2).
 
-A law gives *secant* stiffnesses: T = k_n ⟨δ_n⟩ n + k_t δ_t.  Its memory is one scalar per point, κ, the largest
-value of the law's own loading measure ("demand") so far.  Loading follows the envelope, unloading and
-reloading the secant to the origin (thesis 4.22–4.25).
+A law gives the *secant* stiffnesses of its envelope, k_n = T_n/δ_n and k_t = T_t/|δ_t|, which fall as the bond opens
+and slides.  A point remembers the smallest of each so far, K_n and K_t, and carries T = K_n ⟨δ_n⟩ n + K_t δ_t: it
+follows the envelope wherever it is reached, unloads along the secant to the origin, and loses energy on every path.
 """
 
 from dataclasses import dataclass
-from math import e, sqrt
+from math import e
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-import ufl
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.functions import exp, if_less, positive_part, sqrt
 from cutsim.base.kinematics import Expr
 
 _AGREE = 1e-3  # relative disagreement of strength, opening and toughness that is still rounding
@@ -35,14 +35,11 @@ class CohesiveLaw(Protocol):
     def toughness(self) -> tuple[float, float]:
         """Works of separation (φ_n, φ_t) in pure opening and pure sliding [force/length]."""
 
-    def demand(self, opening: Expr, sliding: Expr) -> Expr:
-        """Loading measure ≥ 0 of a jump; its maximum over time is the history κ."""
+    def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffnesses (k_n, k_t) of the envelope [stress/length], non-increasing in both arguments ≥ 0."""
 
-    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
-        """Secant stiffnesses (k_n, k_t) at a jump whose history, the present included, is κ."""
-
-    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
-        """Damage (D_n, D_t) in [0, 1], non-decreasing in κ."""
+    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
+        """Damage (D_n, D_t) in [0, 1] at the smallest secants so far, non-increasing in them."""
 
 
 def strength_and_opening(
@@ -147,31 +144,21 @@ class Exponential:
         """Works of separation φ_n = e t_n ε_n and φ_t = √(e/2) t_t ε_t [force/length]."""
         return e * self.t_n * self.eps_n, sqrt(e / 2) * self.t_t * self.eps_t
 
-    def demand(self, opening: Expr, sliding: Expr) -> Expr:
-        """Effective jump √(⟨δ_n⟩² + β² δ_t²) with β² = φ_t/φ_n (thesis 4.22)."""
-        phi_n, phi_t = self.toughness
-        # the floor keeps the direction of an unloaded jump defined; it is far below any opening that matters
-        return ufl.sqrt(opening**2 + phi_t / phi_n * sliding**2 + (1e-8 * self.eps_n) ** 2)
-
-    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
-        """Secant stiffnesses at the jump scaled to the envelope by r = κ/δ_eff (thesis 4.24)."""
-        r = kappa / self.demand(opening, sliding)
-        normal = r * opening / self.eps_n
-        decay = ufl.exp(-normal - (r * sliding / self.eps_t) ** 2)
+    def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffnesses of the envelope (thesis 4.20)."""
+        normal = opening / self.eps_n
+        decay = exp(-normal - (sliding / self.eps_t) ** 2)
         k_n = e * self.t_n / self.eps_n * decay
         k_t = sqrt(2 * e) * self.t_t / self.eps_t * (1 + normal) * decay
         return k_n, k_t
 
-    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
-        """Loss of strength in each pure mode after its peak (thesis 4.26, 4.27)."""
-        phi_n, phi_t = self.toughness
-        normal = kappa / self.eps_n
-        sliding = kappa / (ufl.sqrt(phi_t / phi_n) * self.eps_t)
-        D_n = 1 - normal * ufl.exp(1 - normal)
-        D_t = 1 - sqrt(2) * sliding * ufl.exp(0.5 - sliding**2)
-        return (
-            ufl.conditional(ufl.gt(normal, 1), D_n, 0.0),
-            ufl.conditional(ufl.gt(sliding, 1 / sqrt(2)), D_t, 0.0),
+    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
+        """Loss of secant stiffness after the characteristic jump of each mode (thesis 4.26, 4.27).
+
+        In pure modes 1 − exp(1 − δ_n/ε_n) and 1 − exp(1 − δ_t²/ε_t²).
+        """
+        return positive_part(1 - k_n * self.eps_n / self.t_n), positive_part(
+            1 - k_t * self.eps_t / (sqrt(2 / e) * self.t_t)
         )
 
 
@@ -245,25 +232,22 @@ class Bilinear(ByToughness):
         require("rise", rise, 0 < rise < 1, "in (0, 1)")
         return cls(max(t_n**2 / (2 * G_I), t_t**2 / (2 * G_II)) / rise, t_n, G_I, t_t, G_II, eta)
 
-    def demand(self, opening: Expr, sliding: Expr) -> Expr:
-        """Damage d that this jump alone would cause, in [0, 1]."""
+    def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffness (1 − d) K of the envelope in both directions."""
+        # the floor keeps the direction of an unloaded jump defined; it is far below any opening that matters
         floor = (1e-8 * self.t_n / self.penalty) ** 2
         square = opening**2 + sliding**2 + floor
-        jump = ufl.sqrt(square)
+        jump = sqrt(square)
         mix = ((sliding**2 + floor) / square) ** self.eta
-        onset = ufl.sqrt((self.t_n**2 + (self.t_t**2 - self.t_n**2) * mix) / self.penalty**2)
+        onset = sqrt((self.t_n**2 + (self.t_t**2 - self.t_n**2) * mix) / self.penalty**2)
         final = 2 * (self.G_I + (self.G_II - self.G_I) * mix) / (self.penalty * onset)
-        softening = final * (jump - onset) / (jump * (final - onset))
-        return ufl.conditional(ufl.lt(jump, onset), 0.0, ufl.conditional(ufl.gt(jump, final), 1.0, softening))
-
-    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
-        """Secant stiffnesses (1 − κ) K in both directions."""
-        k = (1 - kappa) * self.penalty
+        intact = onset * (final - jump) / (jump * (final - onset))
+        k = self.penalty * if_less(jump, onset, 1.0, if_less(jump, final, intact, 0.0))
         return k, k
 
-    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
-        """The history itself: κ is the damage."""
-        return kappa, kappa
+    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
+        """Loss of secant stiffness, d."""
+        return 1 - k_n / self.penalty, 1 - k_t / self.penalty
 
 
 def process_zone_element(law: CohesiveLaw, young: float) -> float:
@@ -286,11 +270,6 @@ def separation_curve(law: CohesiveLaw, points: int = 400) -> tuple[NDArray[np.fl
         Openings from 0 to 40 ε_n [length], and the work of separation up to each over φ_n [–].
     """
     openings = 40 * law.opening * np.linspace(0, 1, points) ** 2
-
-    def traction(opening: float) -> float:
-        kappa = law.demand(opening, 0.0)
-        return float(law.stiffness(opening, 0.0, kappa)[0]) * opening
-
-    tractions = np.array([traction(float(d)) for d in openings])
+    tractions = law.secants(openings, np.zeros(points))[0] * openings
     work = np.concatenate([[0.0], np.cumsum(0.5 * (tractions[1:] + tractions[:-1]) * np.diff(openings))])
     return openings, work / law.toughness[0]

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import ufl
 
 from cutsim.base.checks import require
-from cutsim.base.kinematics import Expr, positive_part
+from cutsim.base.functions import positive_part
+from cutsim.base.kinematics import Expr
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,7 @@ class Crack(Term):
         self._symbolic_contact = with_constants(state.mesh, self.contact)
         self._warn_coarse(young)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
-        self.history = InterfaceHistory(self.points)
+        self.history = InterfaceHistory(self.points, law)
         self._point_values = self.points.evaluator(self._columns())
 
     # -- virtual work ---------------------------------------------------------------------------------------------
@@ -143,8 +143,8 @@ class Crack(Term):
         slide = jump - gap * n
         multiplier = self.points.at(self.history.multiplier) if self._allowed_penetration else 0.0
         fade = facing(u, N) if self._current else ufl.as_ufl(1.0)
-        kappa = self.points.at(self.history.kappa)
-        r = respond(self._symbolic_law, self._symbolic_contact, gap, slide, kappa, multiplier, fade)
+        memory = self.points.at(self.history.secants)
+        r = respond(self._symbolic_law, self._symbolic_contact, gap, slide, memory, multiplier, fade)
         return CrackResponse(**vars(r), jump=jump, opening=gap, slide=slide, cohesive=r.tension * n + r.shear, normal=n)
 
     # -- history --------------------------------------------------------------------------------------------------
@@ -155,8 +155,8 @@ class Crack(Term):
         r = self.response(u_s)
         increment = displacement_jump(self.state.u) - displacement_jump(self.state.u_old)
         return {
-            "demand": r.demand,
-            "cohesive_power": ufl.dot(r.cohesive, increment),
+            "secants": ufl.as_vector([*r.secants]),
+            "jump": ufl.as_vector([r.opening, *(ufl.dot(r.jump, a) for a in self.frame(u_s))]),
             "contact_power": -r.pressure * ufl.dot(r.normal, increment),
             "stored": 0.5 * ufl.dot(r.cohesive, r.jump),
             "damage": r.damage[0],

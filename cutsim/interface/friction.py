@@ -10,7 +10,8 @@ from typing import Protocol, runtime_checkable
 import ufl
 
 from cutsim.base.checks import require
-from cutsim.base.kinematics import Expr, positive_part
+from cutsim.base.functions import positive_part
+from cutsim.base.kinematics import Expr
 
 # far below any slip, so that directions are differentiable at rest [length]
 _REST = 1e-20

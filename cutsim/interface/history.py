@@ -1,4 +1,4 @@
-"""What the points of an interface remember: damage, multiplier, work along the path (docs/theory.md §3.2)."""
+"""What the points of an interface remember: secants, multiplier, losses and work of contact (docs/theory.md §3.2)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from cutsim.fields.points import FacetPoints, Values
+from cutsim.interface.cohesive import CohesiveLaw
+from cutsim.interface.dissipation import Way, losses
 
 
 @dataclass(frozen=True)
 class PathRule:
-    """Where on the straight path of the displacement over a step interface work is evaluated.
+    """Where on the straight path of the displacement over a step the work of contact is evaluated.
 
     Args:
         places: Fractions of the step.
@@ -21,50 +23,57 @@ class PathRule:
     weights: tuple[float, ...]
 
 
-#: Five Gauss points, for a law that softens within a step.
+#: Five Gauss points, for a contact that closes within a step.
 GAUSS = PathRule(*(tuple(0.5 * (a + b)) for a, b in zip(np.polynomial.legendre.leggauss(5), (1.0, 0.0), strict=True)))
 #: The ends, as for the work of the supports: for points that meet or lose their partner within a step.
 TRAPEZOID = PathRule((0.0, 1.0), (0.5, 0.5))
 
-_COLUMNS = (
-    "demand", "cohesive_power", "contact_power", "stored", "damage", "opening", "sliding", "pressure",
-)  # fmt: skip
+_COLUMNS = ("contact_power", "stored", "damage", "opening", "sliding", "pressure")
 
-#: Values at the points for the fraction s of the step's displacement increment: "demand", "cohesive_power" and
-#: "contact_power" (tractions times increment of the jump), "stored", "damage", "opening", "sliding", "pressure".
+#: Values at the points for the fraction s of the step's displacement increment: "secants" (a vector), "jump" (opening
+#: and slide in components that turn with the interface), "contact_power" (contact traction times increment of the
+#: jump), "stored", "damage", "opening", "sliding", "pressure".
 Along = Callable[[float], dict[str, Values]]
 
 
 class InterfaceHistory:
-    """History, work and contact multiplier at the points of an interface, trial and committed.
+    """Memory, losses and contact multiplier at the points of an interface, trial and committed.
 
     Args:
         points: Integration points.
-        rule: Where work is evaluated.
+        law: Cohesive law, None for a broken interface.
+        rule: Where work of contact is evaluated.
         also: Names of further values that are told of the points.
 
     Attributes:
-        kappa: Largest demand before this step, a function of the points.
+        secants: Smallest secant stiffnesses before this step, a vector at the points [stress/length].
         multiplier: Contact multiplier λ_N, a function of the points [stress].
         trial: Values at the end of the trial step, by name.
     """
 
-    def __init__(self, points: FacetPoints, rule: PathRule = GAUSS, also: tuple[str, ...] = ()) -> None:
-        self._points, self._rule = points, rule
-        self.kappa, self.multiplier = points.function(), points.function()
+    def __init__(
+        self, points: FacetPoints, law: CohesiveLaw | None, rule: PathRule = GAUSS, also: tuple[str, ...] = ()
+    ) -> None:
+        self._points, self._law, self._rule = points, law, rule
+        self.secants, self.multiplier = points.function(2), points.function()
+        if law is not None:
+            zero = np.zeros_like(points.weights)
+            points.set(self.secants, np.stack(law.secants(zero, zero), axis=-1))
         self._multiplier_old = self.multiplier.x.array.copy()
         zero = np.zeros_like(points.weights)
         self.trial = self._trial_old = dict.fromkeys((*_COLUMNS, *also), zero)
-        self._work = self._work_old = {"cohesive": zero, "contact": zero}
+        self._contact = self._contact_old = self._lost = self._lost_old = zero
 
     def evaluate(self, along: Along) -> None:
-        """Trial values, and the work of the step integrated along the path of the displacement. Collective."""
-        self._work = {name: work.copy() for name, work in self._work_old.items()}
-        for s, weight in zip(self._rule.places, self._rule.weights, strict=True):
-            values = along(s)
-            for name in self._work:
-                self._work[name] += weight * values[f"{name}_power"]
-        self.trial = along(1.0)
+        """Trial values, losses and the work of contact over the step. Collective."""
+        at = {s: along(s) for s in sorted({0.0, 1.0, *self._rule.places})}
+        powers = (w * at[s]["contact_power"] for s, w in zip(self._rule.places, self._rule.weights, strict=True))
+        self._contact = sum(powers, start=self._contact_old)
+        self.trial = at[1.0]
+        if self._law is not None:
+            way = Way(*(at[s]["jump"].reshape(-1, at[s]["jump"].shape[-1]) for s in (0.0, 1.0)))
+            lost = losses(self._law, way, self._points.get(self.secants).reshape(-1, 2))
+            self._lost = self._lost_old + lost.reshape(self._points.weights.shape)
 
     def augment(self, pressure: Values, tolerance: float) -> bool:
         """Uzawa step λ ← p (thesis 4.33) if a closed point is off by more than is allowed. Collective.
@@ -87,22 +96,21 @@ class InterfaceHistory:
     def rollback(self) -> None:
         """Restore the contact multiplier, and what is known at the points, of the committed state."""
         self.multiplier.x.array[:] = self._multiplier_old
-        self.trial, self._work = self._trial_old, self._work_old
+        self.trial, self._lost, self._contact = self._trial_old, self._lost_old, self._contact_old
 
     def commit(self) -> None:
-        """Adopt history, work and multiplier of the step."""
-        self._points.set(self.kappa, np.maximum(self._points.get(self.kappa), self.trial["demand"]))
+        """Adopt memory, losses, work and multiplier of the step."""
+        if self._law is not None:
+            self._points.set(self.secants, np.minimum(self._points.get(self.secants), self.trial["secants"]))
         self._multiplier_old[:] = self.multiplier.x.array
-        self._work_old = self._work
-        self._trial_old = self.trial
+        self._trial_old, self._lost_old, self._contact_old = self.trial, self._lost, self._contact
 
     def energies(self) -> dict[str, float]:
-        """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""
-        stored = self._points.integral(self.trial["stored"])
+        """Recoverable and lost part of the cohesive work, and the energy of the contact penalty. Collective."""
         return {
-            "cohesive_stored": stored,
-            "fracture": self._points.integral(self._work["cohesive"]) - stored,
-            "contact": self._points.integral(self._work["contact"]),
+            "cohesive_stored": self._points.integral(self.trial["stored"]),
+            "fracture": self._points.integral(self._lost),
+            "contact": self._points.integral(self._contact),
         }
 
     def damage_increment(self) -> float:
@@ -111,8 +119,8 @@ class InterfaceHistory:
 
     def dissipated(self) -> Values:
         """Fracture dissipation so far at the points [energy per reference area]."""
-        return self._work["cohesive"] - self.trial["stored"]
+        return self._lost
 
     def dissipation(self) -> Values:
         """Fracture dissipation of the trial step at the points [energy per reference area]."""
-        return self.dissipated() - (self._work_old["cohesive"] - self._trial_old["stored"])
+        return self._lost - self._lost_old

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import ufl
 
+from cutsim.base.functions import if_less
 from cutsim.base.kinematics import Expr, safe_norm
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 
-# relative distance below its history at which a point still counts as loading
+# relative distance above its memory at which a secant still counts as loading
 _AT_HISTORY = 1e-9
 # floor of the amount of sliding, relative to the characteristic opening of a law
 _REST = 1e-12
@@ -20,7 +21,7 @@ class Response:
 
     Attributes:
         sliding: Magnitude of the slide [length].
-        demand: Loading measure of the cohesive law [its own unit].
+        secants: Smallest secant stiffnesses so far, in opening and sliding [stress/length]; 0 without a law.
         tension: Cohesive traction along the normal, positive where it pulls the faces together [stress].
         shear: Cohesive traction along the slide, in the components of the slide [stress].
         penetration: Penetration that the pressure belongs to, with the part λ_N/ε_N that a multiplier makes up for;
@@ -30,7 +31,7 @@ class Response:
     """
 
     sliding: Expr
-    demand: Expr
+    secants: tuple[Expr, Expr]
     tension: Expr
     shear: Expr
     penetration: Expr
@@ -43,7 +44,7 @@ def respond(
     contact: PenaltyContact,
     gap: Expr,
     slide: Expr,
-    kappa: Expr,
+    memory: Expr,
     multiplier: Expr = 0.0,
     fade: Expr = 1.0,
 ) -> Response:
@@ -54,7 +55,7 @@ def respond(
         contact: Contact law.
         gap: Opening δ_n, negative for penetration [length].
         slide: Tangential part δ_t of the jump, a vector of any components [length].
-        kappa: Largest demand before this step.
+        memory: Smallest secant stiffnesses before this step, a vector [stress/length].
         multiplier: Contact multiplier λ_N [stress].
         fade: Factor of the pressure in [0, 1].
     """
@@ -63,18 +64,17 @@ def respond(
     pressure = fade * contact.pressure(depth)
     if law is None:
         none, whole = ufl.as_ufl(0.0), ufl.as_ufl(1.0)
-        return Response(safe_norm(slide, _REST), none, none, 0 * slide, depth, pressure, (whole, whole))
+        return Response(safe_norm(slide, _REST), (none, none), none, 0 * slide, depth, pressure, (whole, whole))
     sliding = safe_norm(slide, _REST * law.opening)
-    demand = law.demand(opening, sliding)
-    largest = _largest(demand, kappa)
-    k_n, k_t = law.stiffness(opening, sliding, largest)
-    return Response(sliding, demand, k_n * opening, k_t * slide, depth, pressure, law.damage(largest))
+    envelope = law.secants(opening, sliding)
+    k_n, k_t = (_smaller(k, memory[i]) for i, k in enumerate(envelope))
+    return Response(sliding, (k_n, k_t), k_n * opening, k_t * slide, depth, pressure, law.damage(k_n, k_t))
 
 
-def _largest(demand: Expr, kappa: Expr) -> Expr:
-    """Largest demand so far, the present one included.
+def _smaller(secant: Expr, memory: Expr) -> Expr:
+    """Smallest secant so far, the present one included.
 
     A step starts with every point exactly at its history.  There it counts as loading, so that Newton's first
     tangent is that of the growing crack, and not a mixture of loading and unloading points drawn by rounding.
     """
-    return ufl.conditional(ufl.gt(demand, (1 - _AT_HISTORY) * kappa), demand, kappa)
+    return if_less(secant, (1 + _AT_HISTORY) * memory, secant, memory)

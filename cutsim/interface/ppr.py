@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 
-import ufl
-
 from cutsim.base.checks import require
-from cutsim.base.kinematics import Expr, positive_part
+from cutsim.base.functions import if_less, larger, positive_part
+from cutsim.base.kinematics import Expr
 from cutsim.interface.cohesive import ByToughness
 
 
@@ -25,8 +24,8 @@ class ParkPaulinoRoesler(ByToughness):
         G_II: Toughness φ_t in sliding > 0 [force/length].
         alpha: Shape α > 1 of softening in opening: 2 is about linear, more is concave, less convex [–].
         beta: Shape β > 1 of softening in sliding [–].
-        peak_n: Opening of the peak over the final one, 0 < λ_n < 1/√α [–].
-        peak_t: Sliding of the peak over the final one, 0 < λ_t < 1/√β [–].
+        peak_n: Opening of the peak over the final one, 0 < λ_n ≤ 1/√(2α − 1) [–].
+        peak_t: Sliding of the peak over the final one, 0 < λ_t ≤ 1/√(2β − 1) [–].
 
     Raises:
         ValueError: A number is outside its range.
@@ -47,7 +46,9 @@ class ParkPaulinoRoesler(ByToughness):
         for name, peak in (("alpha", "peak_n"), ("beta", "peak_t")):
             shape, place = getattr(self, name), getattr(self, peak)
             require(name, shape, shape > 1, "> 1")
-            require(peak, place, 0 < place < shape**-0.5, f"in (0, 1/sqrt({name}) = {shape**-0.5:g})")
+            # beyond this the secant would first rise
+            limit = (2 * shape - 1) ** -0.5
+            require(peak, place, 0 < place <= limit, f"in (0, 1/sqrt(2 {name} - 1) = {limit:g}]")
 
     @property
     def final(self) -> tuple[float, float]:
@@ -55,27 +56,24 @@ class ParkPaulinoRoesler(ByToughness):
         normal = _slope(self.peak_n, self.alpha, self.peak_n) * self.G_I / self.t_n
         return normal, _slope(self.peak_t, self.beta, self.peak_t) * self.G_II / self.t_t
 
-    def demand(self, opening: Expr, sliding: Expr) -> Expr:
-        """Effective jump √(⟨δ_n⟩² + β² δ_t²) with β² = φ_t/φ_n (thesis 4.22)."""
-        return ufl.sqrt(opening**2 + self.G_II / self.G_I * sliding**2 + (1e-8 * self.opening) ** 2)
-
-    def stiffness(self, opening: Expr, sliding: Expr, kappa: Expr) -> tuple[Expr, Expr]:
-        """Secant stiffnesses at the jump scaled to the envelope by r = κ/δ_eff (thesis 4.24)."""
-        r = kappa / self.demand(opening, sliding)
+    def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
+        """Secant stiffnesses of the envelope."""
         normal, tangential = self.final
-        x, y = r * opening / normal, r * sliding / tangential
-        larger = ufl.max_value(self.G_I, self.G_II)
-        across = positive_part(larger * _shape(y, self.beta, self.peak_t) - positive_part(self.G_II - self.G_I))
-        along = positive_part(larger * _shape(x, self.alpha, self.peak_n) - positive_part(self.G_I - self.G_II))
+        x, y = opening / normal, sliding / tangential
+        energy = larger(self.G_I, self.G_II)
+        across = positive_part(energy * _shape(y, self.beta, self.peak_t) - positive_part(self.G_II - self.G_I))
+        along = positive_part(energy * _shape(x, self.alpha, self.peak_n) - positive_part(self.G_I - self.G_II))
         k_n = _secant(x, self.alpha, self.peak_n) / normal**2 * across
         k_t = _secant(y, self.beta, self.peak_t) / tangential**2 * along
         return k_n, k_t
 
-    def damage(self, kappa: Expr) -> tuple[Expr, Expr]:
-        """Loss of strength in each pure mode after its peak (thesis 4.26, 4.27)."""
+    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
+        """Loss of secant stiffness after the peak of each mode (thesis 4.26, 4.27)."""
         normal, tangential = self.final
-        y = kappa / (ufl.sqrt(self.G_II / self.G_I) * tangential)
-        return _damage(kappa / normal, self.alpha, self.peak_n), _damage(y, self.beta, self.peak_t)
+        return (
+            positive_part(1 - k_n * self.peak_n * normal / self.t_n),
+            positive_part(1 - k_t * self.peak_t * tangential / self.t_t),
+        )
 
 
 def _exponent(shape: Expr, peak: Expr) -> Expr:
@@ -86,7 +84,7 @@ def _exponent(shape: Expr, peak: Expr) -> Expr:
 def _shape(x: Expr, shape: Expr, peak: Expr) -> Expr:
     """Potential f of one mode over its toughness, from 1 to 0."""
     m = _exponent(shape, peak)
-    return ufl.conditional(ufl.lt(x, 1), (1 - x) ** shape * (1 + shape * x / m) ** m, 0.0)
+    return if_less(x, 1.0, positive_part(1 - x) ** shape * (1 + shape * x / m) ** m, 0.0)
 
 
 def _slope(x: Expr, shape: Expr, peak: Expr) -> Expr:
@@ -98,11 +96,5 @@ def _slope(x: Expr, shape: Expr, peak: Expr) -> Expr:
 def _secant(x: Expr, shape: Expr, peak: Expr) -> Expr:
     """−f'/x, zero from the final opening on."""
     m = _exponent(shape, peak)
-    secant = shape * (shape / m + 1) * (1 - x) ** (shape - 1) * (1 + shape * x / m) ** (m - 1)
-    return ufl.conditional(ufl.lt(x, 1), secant, 0.0)
-
-
-def _damage(x: Expr, shape: Expr, peak: Expr) -> Expr:
-    """1 − f'/f'(peak) after the peak."""
-    lost = 1 - x * _secant(x, shape, peak) / _slope(peak, shape, peak)
-    return ufl.conditional(ufl.gt(x, peak), lost, 0.0)
+    secant = shape * (shape / m + 1) * positive_part(1 - x) ** (shape - 1) * (1 + shape * x / m) ** (m - 1)
+    return if_less(x, 1.0, secant, 0.0)

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import ufl
 
-from cutsim.base.kinematics import Expr, positive_part
+from cutsim.base.functions import positive_part
+from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State

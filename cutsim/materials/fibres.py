@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.integrate import lebedev_rule
 
 from cutsim.base.checks import require
-from cutsim.base.kinematics import Expr, positive_part
+from cutsim.base.functions import positive_part
+from cutsim.base.kinematics import Expr
 from cutsim.materials.directions import Direction, require_axes, require_direction, squared_stretch, stretches_in
 from cutsim.materials.elastic import Material, WithoutPlaneStress, isochoric_invariant
 

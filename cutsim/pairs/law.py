@@ -62,11 +62,12 @@ class PairLaw:
         slide = ufl.as_vector([jump[i] for i in range(1, self._dim)])
         law = None if laws.cohesive is None else with_constants(state.mesh, laws.cohesive)
         contact = with_constants(state.mesh, laws.contact)
-        r = respond(law, contact, jump[0], slide, points.at(history.kappa), points.at(history.multiplier))
+        r = respond(law, contact, jump[0], slide, points.at(history.secants), points.at(history.multiplier))
         shear = [r.shear[i] for i in range(self._dim - 1)]
         columns = {
-            "demand": r.demand,
-            "cohesive": ufl.as_vector([r.tension, *shear]),
+            "secants": ufl.as_vector([*r.secants]),
+            "jump": ufl.as_vector([jump[i] for i in range(self._dim)]),
+            "stored": 0.5 * ufl.dot(ufl.as_vector([r.tension, *shear]), jump),
             "damage": r.damage[0],
             "sliding": r.sliding,
             "pressure": r.pressure,
@@ -96,7 +97,7 @@ class PairLaw:
         self._points.set(self._met, met.reshape(shape))
 
     def values(self) -> dict[str, Values]:
-        """Values of the law for the present jump: what `InterfaceHistory` wants, "cohesive" as a vector, and "held"."""
+        """Values of the law for the present jump: what `InterfaceHistory` wants but the power, and "held"."""
         return self._values()
 
     def traction(self) -> Array:

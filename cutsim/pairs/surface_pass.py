@@ -63,7 +63,7 @@ class SurfacePass:
         self._dim = state.mesh.geometry.dim
         own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
         self.weights = weight * own.ravel()
-        self.history = InterfaceHistory(points, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
+        self.history = InterfaceHistory(points, laws.cohesive, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
         self._law = PairLaw(state, points, laws, self.history, kinematics.pairs(self._start()))
         self.slip = self._law.slip
         self._seen: Array | None = None
@@ -120,11 +120,8 @@ class SurfacePass:
         values = self._law.values()
         change = pairs.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
         power = np.einsum("nai,ni->na", pairs.slave.frames, change)
-        cohesive = values.pop("cohesive").reshape(-1, self._dim)
         return values | {
-            "cohesive_power": self._shaped(np.einsum("na,na->n", cohesive, power)),
             "contact_power": -values["pressure"] * self._shaped(power[:, 0]),
-            "stored": 0.5 * self._shaped(np.einsum("na,na->n", cohesive, pairs.jump)),
             "opening": self._shaped(pairs.jump[:, 0]),
         }
 

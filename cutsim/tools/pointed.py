@@ -9,7 +9,8 @@ import ufl
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
-from cutsim.base.kinematics import Expr, positive_part
+from cutsim.base.functions import positive_part
+from cutsim.base.kinematics import Expr
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit
 
 

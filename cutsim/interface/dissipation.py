@@ -1,0 +1,135 @@
+"""What a bond loses on the way of its jump over a step, exactly for a step of any size (docs/theory.md §3.2).
+
+With the smallest secants K_n and K_t as memory the loss is −½ ∫ (dK_n δ_n² + dK_t δ_t²), mode by mode.  A mode loses
+energy only after its secant has fallen below its memory; from there on, by parts, it is ∫ k δ dδ − [½ k δ²].
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutsim.interface.cohesive import CohesiveLaw
+
+Array = NDArray[np.float64]
+
+_PLACES, _WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(5)[i] + (1.0, 0.0)[i]) for i in (0, 1))
+# loss that is not resolved, as a fraction of the toughness
+_TOLERANCE = 1e-11
+# secant over its memory at which a bond is broken
+_BROKEN = 1e-16
+# halvings of a step: for a place on it, whose error enters the loss squared, and at the most for parts of the way
+_LOCATE, _HALVINGS = 40, 48
+
+
+@dataclass(frozen=True)
+class Way:
+    """Straight ways of the jump over a step, in components that turn with the interface.
+
+    Attributes:
+        start: Opening and slide at the start, shape (points, components) [length].
+        end: The same at the end.
+    """
+
+    start: Array
+    end: Array
+
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """Opening ≥ 0, sliding and δ dδ/ds of each mode at fractions of the step.
+
+        Args:
+            s: Fractions, shape (points, places).
+
+        Returns:
+            Opening and sliding, shape (points, places), and δ dδ/ds, shape (2, points, places).
+        """
+        change = (self.end - self.start)[:, None, :]
+        jump = self.start[:, None, :] + s[..., None] * change
+        opening = np.maximum(jump[..., 0], 0.0)
+        slide = jump[..., 1:]
+        rates = np.stack([opening * change[..., 0], (slide * change[..., 1:]).sum(axis=-1)])
+        return opening, np.linalg.norm(slide, axis=-1), rates
+
+    def of(self, points: NDArray[np.bool_] | NDArray[np.intp]) -> "Way":
+        """The ways of some points."""
+        return Way(self.start[points], self.end[points])
+
+
+def losses(law: CohesiveLaw, way: Way, memory: Array) -> Array:
+    """Energy lost on the ways [energy per reference area], ≥ 0.
+
+    Args:
+        law: The law.
+        way: The ways.
+        memory: Smallest secants before, shape (points, 2) [stress/length].
+
+    Returns:
+        One value a point.
+    """
+    total = np.zeros(len(memory))
+    at_end = np.stack(law.secants(*(values[:, 0] for values in way.at(np.ones((len(memory), 1)))[:2])), axis=-1)
+    for mode in (0, 1):
+        loading = np.flatnonzero(at_end[:, mode] < memory[:, mode])
+        if loading.size:
+            total[loading] += _loss(law, way.of(loading), memory[loading, mode], mode)
+    return total
+
+
+def _loss(law: CohesiveLaw, way: Way, memory: Array, mode: int) -> Array:
+    """Loss of one mode at points where it is below its memory at the end."""
+
+    def secant(s: Array) -> Array:
+        return np.asarray(law.secants(*way.at(s[:, None])[:2])[mode])[:, 0]
+
+    def stored(s: Array, k: Array) -> Array:
+        jump = way.at(s[:, None])[mode][:, 0]
+        return 0.5 * k * jump**2
+
+    def power(points: NDArray[np.intp], s: Array) -> Array:
+        opening, sliding, rates = way.of(points).at(s)
+        return np.asarray(law.secants(opening, sliding)[mode] * rates[mode])
+
+    start = _last(lambda s: secant(s) >= memory, len(memory))
+    # a long step is cut where nothing is left of the bond: no point of the rule might meet what is before
+    end = _last(lambda s: secant(s) > _BROKEN * memory, len(memory))
+    work = _integral(power, start, end, _TOLERANCE * law.toughness[mode])
+    left = np.where(end < 1.0, 0.0, stored(end, secant(end)))
+    return np.maximum(work + stored(start, memory) - left, 0.0)
+
+
+def _last(holds: Callable[[Array], NDArray[np.bool_]], points: int) -> Array:
+    """Where on the way a condition that holds at its start, if anywhere, ends to hold."""
+    low, high = np.zeros(points), np.full(points, 0.5**_LOCATE)
+    beyond, throughout = holds(high), holds(np.ones(points))
+    if not (beyond & ~throughout).any():  # the common case: from the start, or not in this step
+        return np.where(beyond, 1.0, 0.0)
+    high = np.where(beyond, 1.0, high)
+    for _ in range(_LOCATE):
+        middle = 0.5 * (low + high)
+        still = holds(middle)
+        low, high = np.where(still, middle, low), np.where(still, high, middle)
+    return np.where(throughout, 1.0, low)
+
+
+def _integral(power: Callable[[NDArray[np.intp], Array], Array], start: Array, end: Array, tolerance: float) -> Array:
+    """Integrals along the ways, each halved until Gauss's rule with five points is as good as with ten."""
+
+    def gauss(points: NDArray[np.intp], a: Array, b: Array) -> Array:
+        return np.asarray((power(points, a[:, None] + (b - a)[:, None] * _PLACES) @ _WEIGHTS) * (b - a))
+
+    total = np.zeros(len(start))
+    points, a, b = np.arange(len(start)), start, end
+    whole = gauss(points, a, b)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (a + b)
+        first, second = gauss(points, a, middle), gauss(points, middle, b)
+        good = np.abs(first + second - whole) <= tolerance
+        np.add.at(total, points[good], (first + second)[good])
+        if good.all():
+            return total
+        rest = ~good
+        points, whole = np.tile(points[rest], 2), np.concatenate([first[rest], second[rest]])
+        a, b = np.concatenate([a[rest], middle[rest]]), np.concatenate([middle[rest], b[rest]])
+    np.add.at(total, points, whole)
+    return total
