@@ -59,11 +59,17 @@ class Residual:
         """
         return u[self.held] - self._g.array[self.held]
 
+    def violated(self, tolerance: float) -> bool:
+        """Whether a prescribed value is missed by more than a tolerance [length]."""
+        worst = float(np.abs(self.violation(self._u.x.array)).max(initial=0.0))
+        return bool(self._comm.allreduce(worst, MPI.MAX) > tolerance)
+
     def assemble(self, *, lift: bool) -> Array:
         """Owned forces at the present u.
 
         Args:
-            lift: Whether to add what the increments to the prescribed values bring through the tangent.
+            lift: Whether to add what the increments to the prescribed values bring through the tangent, which costs as
+                much as the forces.
         """
         for term in self._terms:
             term.prepare()
@@ -84,7 +90,6 @@ class Residual:
         jump[:] = 0.0
         jump[self.held] = -self.violation(self._u.x.array)
         self._lifted.scatter_forward()
-        lift = lift and self._comm.allreduce(bool(jump.any()), MPI.LOR)
         self._added.set(0.0)
         for term in self._terms:
             term.add_forces(self._added, jump if lift else None)
