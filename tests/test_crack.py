@@ -9,6 +9,8 @@ from dolfinx import fem, la
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.compat import form
+from cutsim.bodies.loads import Support
+from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.materials.elastic import NeoHookean, StVenantKirchhoff
 from cutsim.materials.rubbers import MooneyRivlin
@@ -112,6 +114,38 @@ def test_work_of_separation_of_the_pure_modes(law, direction, mode):
     rows, _ = drag(law, np.array([(0, 0), 14 * np.array(direction) / (1 + mode)]) * scale, steps=400)
     for work in (rows["work_external"][-1], rows["energy_fracture"][-1]):
         assert work == pytest.approx(law.toughness[mode], rel=1e-3)
+
+
+def random_path(scale, legs=24, seed=3):
+    """Corners of a path of the jump (sliding, opening), from rest."""
+    corners = np.random.default_rng(seed).uniform((-3, -0.02), (3, 3), (legs, 2))
+    return np.vstack([[0, 0], corners]) * scale
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("law", LAWS)
+def test_no_column_of_dissipation_ever_falls(law):
+    """Between rigid blocks the audit also closes, however the jump turns."""
+    law, _, scale = LAWS[law]
+    rows, _ = drag(law, random_path(scale), steps=24 * 32)
+    assert (np.diff(rows["energy_fracture"]) >= 0).all()
+    assert np.abs(rows["energy_closure"]).max() < 5e-3
+
+
+@pytest.mark.mpi
+def test_no_body_gains_from_its_bond():
+    """A glued block whose top is moved along a random path: the bond only ever takes."""
+    law = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
+    corners = random_path(law.opening)
+    legs = np.arange(len(corners))
+    b = make_blocks(n=4)
+    top = [Support(b.state, b.face(1, 1.0), i, lambda t, c=c: np.interp(t, legs, c)) for i, c in enumerate(corners.T)]
+    base = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
+    crack = b.crack(law, contact=PENALTY)
+    mechanics = Mechanics(b.state, [crack, b.solid(NeoHookean(E, NU))], base + top)
+    rows = history(mechanics, legs[-1], StepControl(0.05, 0.1))
+    assert (np.diff(rows["energy_fracture"]) >= 0).all() and rows["energy_fracture"][-1] > 0.01
+    assert np.abs(rows["energy_closure"]).max() < 0.05
 
 
 SHEAR_AFTER_OPENING = {0.5: 0.545, 1.0: 0.632, 2.0: 0.797, 5.0: 0.980}
