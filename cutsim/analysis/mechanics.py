@@ -11,12 +11,13 @@ from dolfinx import cpp, la
 from numpy.typing import NDArray
 
 from cutsim.analysis.energy import EnergyAudit
+from cutsim.analysis.mobility import extent, free_motion
 from cutsim.base.assembly import global_dot
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Term
 from cutsim.bodies.inertia import Inertia
-from cutsim.bodies.loads import Support
+from cutsim.bodies.loads import Load, Support
 from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
@@ -24,6 +25,8 @@ from cutsim.interface.crack import Crack
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.solvers.newton import NonlinearProblem, Outcome
 
+# displacement over the size of the mesh at which a solve is given up
+_RUNAWAY = 100.0
 #: Uzawa augmentations allowed in one step.
 AUGMENTATIONS = 30
 
@@ -91,6 +94,7 @@ class Mechanics:
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
             rtol=rtol,
+            largest=_RUNAWAY * extent(state.mesh.comm, state.mesh.geometry.x),
         )
         self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
@@ -105,6 +109,22 @@ class Mechanics:
     def corners(self) -> tuple[float, ...]:
         """Times at which a path, load or prescribed velocity has a kink."""
         return tuple(sorted({c for part in self._parts for c in part.corners}))
+
+    def check(self) -> None:
+        """Refuse a static problem in which a body is free to move. Collective.
+
+        Raises:
+            ValueError: A piece of a body can move as a rigid body, and nothing resists at the committed state.
+        """
+        if self.inertia is not None:
+            return
+        bodies = {t.name: t.cells for t in self.terms if isinstance(t, Solid)}
+        motion = free_motion(self.state, self.problem.fixed, self.problem.resistance, bodies)
+        if motion is not None:
+            raise ValueError(
+                f"{motion}: neither a support nor a bond nor a closed contact holds it. Add a Support, let the "
+                "surfaces overlap a little where a contact is to hold it, or use analysis='dynamic'"
+            )
 
     def begin(self, time: float) -> None:
         """Start a trial step that ends at `time`. Collective.
@@ -188,6 +208,16 @@ class Mechanics:
     def diagnose(self) -> str:
         """After a failed solve: what is wrong and where, in words. Collective."""
         return "; ".join(words for t in self.terms if (words := t.diagnose()))
+
+    def advise(self) -> str:
+        """What may be tried where no step succeeds, in words; empty if nothing is known."""
+        loads = [t.name for t in self.terms if isinstance(t, Load)]
+        if not loads or self.inertia is not None:
+            return ""
+        return (
+            f"there may be no equilibrium under more of {', '.join(loads)} (a limit point): prescribe a displacement "
+            "instead of the load, or use analysis='dynamic'"
+        )
 
     def reaction(self, support: Support) -> float:
         """Reaction of a support along its component in the trial state [force]. Collective."""

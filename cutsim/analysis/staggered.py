@@ -65,6 +65,14 @@ class ThermoMechanics:
         """Energy audit of the mechanics including the trial step."""
         return self.mechanics.trial_audit
 
+    def check(self) -> None:
+        """Refuse a problem in which a body is free to move. Collective."""
+        self.mechanics.check()
+
+    def advise(self) -> str:
+        """What may be tried where no step succeeds, in words."""
+        return self.mechanics.advise()
+
     def begin(self, time: float) -> None:
         """Start a trial step that ends at `time`."""
         self.mechanics.begin(time)

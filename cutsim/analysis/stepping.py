@@ -66,6 +66,12 @@ class Problem(Protocol):
     def trial_audit(self) -> Audit:
         """Audit including the trial step."""
 
+    def check(self) -> None:
+        """Refuse, before anything is solved, what has no solution. Collective."""
+
+    def advise(self) -> str:
+        """What may be tried where no step succeeds, in words; empty if nothing is known."""
+
     def begin(self, time: float) -> None:
         """Start a trial step that ends at `time`."""
 
@@ -193,10 +199,11 @@ def run(
 
     Raises:
         StepError: The smallest step was reached; says when, where and why.
-        ValueError: `until` is not later than the committed time.
+        ValueError: `until` is not later than the committed time, or a body is free to move.
     """
     state = problem.state
     require("until", until, until > state.time_old, f"> the present time {state.time_old}")
+    problem.check()
     corners = [c for c in (*problem.corners, until) if c <= until]
     dt, report, number = control.first, None, 0
     smooth = False  # whether the last step tells where the next one leads
@@ -234,6 +241,7 @@ def _advance(problem: Problem, control: StepControl, dt: float, corner: float, *
             raise StepError(
                 f"no step from time {start:.6g} of {dt / control.cut:.3g} or more succeeds "
                 f"(smallest = {control.smallest:.3g}): {refusal}"
+                + (f". {advice}" if (advice := problem.advise()) else "")
             )
 
 

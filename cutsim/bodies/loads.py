@@ -83,7 +83,7 @@ class Support:
         return float(self.state.mesh.comm.allreduce(float(residual[self.dofs].sum())))
 
 
-class _Load(Term, ABC):
+class Load(Term, ABC):
     """Load on a part of the boundary, `_density` per reference area; it follows one factor that varies in time."""
 
     def __init__(
@@ -138,7 +138,7 @@ class _Load(Term, ABC):
         self._forces_old = self._forces
 
 
-class Traction(_Load):
+class Traction(Load):
     """Dead traction on a part of the boundary.
 
     Args:
@@ -172,7 +172,7 @@ class Traction(_Load):
         return ufl.as_vector(self._direction)
 
 
-class Pressure(_Load):
+class Pressure(Load):
     """Pressure of a fluid on a part of the boundary: it acts along the current normal, per current area.
 
     Nanson's formula gives the force −p cof(F) N per reference area; in plane stress the change of thickness is left

@@ -93,6 +93,13 @@ class HeatTransfer:
         """Audit of heat including the trial step."""
         return self._trial_audit
 
+    def check(self) -> None:
+        """Nothing: with capacity there is always a temperature."""
+
+    def advise(self) -> str:
+        """Nothing is known."""
+        return ""
+
     def begin(self, time: float) -> None:
         """Start a trial step that ends at `time`; in a coupled step, after the mechanical part is evaluated."""
         self.state.begin(time)

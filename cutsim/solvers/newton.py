@@ -53,6 +53,7 @@ _SENTENCES = {
     _Reason.DIVERGED_LOCAL_MIN: "line search failed at a local minimum of the residual",
     _Reason.DIVERGED_LINEAR_SOLVE: "linear solver did not converge",
     _Reason.DIVERGED_DTOL: f"residual grew by more than {GROWTH:.0e}",
+    _Reason.DIVERGED_FUNCTION_COUNT: "the solution runs away: something moves freely, or there is no equilibrium",
 }
 
 
@@ -135,6 +136,8 @@ class NonlinearProblem:
         multipliers: Further unknowns, on which F depends, with their equations.
         form_compiler_options: Options of FFCx.
         rtol: Tolerance relative to the force scale; PETSc option `snes_rtol`.
+        largest: Size of an entry of u, or of a multiplier, at which a solve is given up: the rounding level grows with
+            u, so that far away everything would count as converged.
 
     Attributes:
         known: Owned nodal forces that are added to those of F, such as the share of the last step in a time
@@ -163,8 +166,10 @@ class NonlinearProblem:
         multipliers: Sequence[Multiplier] = (),
         form_compiler_options: Mapping[str, Any] | None = None,
         rtol: float = 1e-8,
+        largest: float = np.inf,
     ) -> None:
         require("rtol", rtol, rtol > 0.0, "positive")
+        self._largest = largest
         self._options = Options(petsc_options_prefix, petsc_options or {})
         self.u, self.bcs = u, list(bcs)
         self._symmetric, self._interface_dofs, self._by_start = symmetric, interface_dofs, inertia or not bcs
@@ -347,6 +352,32 @@ class NonlinearProblem:
         b.array[~self.fixed] = 0.0
         return b
 
+    def resistance(self, motions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Forces against motions by the tangent at the present u, without any Dirichlet condition. Collective.
+
+        Args:
+            motions: Owned displacements, one motion a row [length].
+
+        Returns:
+            Owned forces, of the same shape, and the mean entry of the tangent's diagonal [force/length].
+        """
+        if self._tangent.outdated:
+            self._renew_tangent()
+        for term in self._terms:
+            term.prepare()
+        self._tangent.assemble(())
+        x, y = self._tangent.A.createVecs()
+        forces = np.empty_like(motions)
+        for motion, force in zip(motions, forces, strict=True):
+            x.array[:] = motion
+            self._tangent.A.mult(x, y)
+            force[:] = y.array_r
+        x.destroy()
+        y.destroy()
+        diagonal = self._tangent.diagonal
+        total, size = self._comm.allreduce(np.array([np.abs(diagonal).sum(), diagonal.size]))
+        return forces, float(total / size)
+
     def _set_matrix(self) -> None:
         A = self._multipliers.around(self._tangent.A, symmetric=self._symmetric)
         self._snes.setJacobian(_weakly(self._evaluate_tangent), A)
@@ -391,6 +422,8 @@ class NonlinearProblem:
         free, reaction, stiffness = np.sqrt(self._comm.allreduce(np.array([np.sum(s**2) for s in squares])))
         held = f[self._forces.held]
         jump, size = (self._comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX) for v in (held, x))
+        if iteration > 0 and size > self._largest:
+            return _Reason.DIVERGED_FUNCTION_COUNT
         self._size = max(self._size, size)
         length = self._size + self._h
         reason = self._judge(iteration, free, reaction, ROUNDING * stiffness * length, jump <= BC_ROUNDING * length)
