@@ -79,6 +79,7 @@ class Mechanics:
         self.inertia = Inertia(state, solids, scheme, mass) if analysis == "dynamic" else None
         self.terms: tuple[Term, ...] = self._static if self.inertia is None else (*terms, self.inertia)
         self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
+        _check_one_law(state, [t for t in terms if isinstance(t, Crack)])
         v = ufl.TestFunction(state.V)
         interfaces = [t for t in terms if isinstance(t, Crack | SurfacePair)]
         self.problem = NonlinearProblem(
@@ -261,3 +262,11 @@ class Mechanics:
                 marks.array[dofmap.cell_dofs(cell)[closure[facet]]] = 1.0
         marks.scatter_reverse(la.InsertMode.add)
         return np.flatnonzero(marks.array[: dofmap.index_map.size_local]).astype(np.int32)
+
+
+def _check_one_law(state: State, cracks: Sequence[Crack]) -> None:
+    """Refuse two cracks on one facet, whose laws would add up. Collective."""
+    for i, one in enumerate(cracks):
+        for other in cracks[i + 1 :]:
+            both = state.mesh.comm.allreduce(len(np.intersect1d(one.points.facets, other.points.facets)))
+            require("terms", f"{one.name!r} and {other.name!r}", both == 0, f"cracks without common facets, not {both}")

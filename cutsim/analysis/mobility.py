@@ -50,7 +50,7 @@ def free_motion(
         motions[p * kinds : (p + 1) * kinds] = np.where(piece[:nodes, None] == p, modes, 0.0).reshape(kinds, -1)
     sizes = np.array([comm.allreduce(np.count_nonzero(piece[:nodes] == p)) for p in range(count)])
     forces, stiffness = resistance(motions)
-    matrix = motions @ forces.T / stiffness + motions[:, held] @ motions[:, held].T
+    matrix = motions @ forces.T / (stiffness or 1.0) + motions[:, held] @ motions[:, held].T
     matrix = comm.allreduce(0.5 * (matrix + matrix.T))
     scale = 1 / np.sqrt(np.repeat(np.maximum(sizes, 1), kinds))
     values, vectors = np.linalg.eigh(scale[:, None] * matrix * scale)
@@ -108,7 +108,7 @@ def _words(free: Array, gdim: int, *, axisymmetric: bool) -> str:
     # a unit motion is free if its projection on the free space is all of it
     along = [axis for i, axis in enumerate(axes) if np.linalg.norm(space[:, i]) > 1 - 1e-6]
     if along:
-        return "slide along " + " and ".join(along)
+        return "slide along " + " and ".join(along) + (" and turn" if len(space) > len(along) else "")
     if np.abs(space[0, len(axes) :]).max(initial=0.0) < 1e-6:
         return "slide along ({})".format(", ".join(f"{c:.3g}" for c in space[0]))
     return "turn"

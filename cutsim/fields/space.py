@@ -23,6 +23,7 @@ from cutsim.base import compat
 
 Facets = NDArray[np.int32] | Sequence[NDArray[np.int32]]
 
+_CRACKED = "cracked_facets"  # attribute of a cracked space: which local facets, ghosts included, it is cracked along
 _TANGENT = 1e-3  # |n·e| below which the side of a facet cannot be told from the direction e
 
 
@@ -59,7 +60,33 @@ def cracked_space(mesh: Mesh, element: Any, facets: Facets) -> fem.FunctionSpace
     _check_element(parent.ufl_element())
     incidence = _incidence(mesh, parent, cracked)
     dofs, owners = _split_dofs(parent, incidence, _copies(mesh.comm, incidence))
-    return _with_dofs(parent, dofs, owners)
+    space = _with_dofs(parent, dofs, owners)
+    vars(space)[_CRACKED] = cracked
+    return space
+
+
+def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) -> None:
+    """Refuse a crack on facets along which the space holds together: it could not open. Collective.
+
+    Args:
+        V: The space.
+        facets: Local facets of the crack.
+        name: Name of the crack.
+
+    Raises:
+        ValueError: On all ranks, with the number of these facets and the place of one.
+    """
+    comm, facets = V.mesh.comm, np.asarray(facets, dtype=np.int32)
+    cracked = vars(V).get(_CRACKED)
+    whole = facets if cracked is None else facets[~cracked[facets]]
+    problem = None
+    if len(whole):
+        place = ", ".join(f"{c:.4g}" for c in compute_midpoints(V.mesh, V.mesh.topology.dim - 1, whole[:1])[0])
+        problem = (
+            f"facets of {name!r}: the space is not cracked along {len(whole)} of {len(facets)} of them (on one rank), "
+            f"one of which is at ({place}); they must be among the facets that were given to cracked_space"
+        )
+    _refuse(comm, problem)
 
 
 def vertex_space(V: fem.FunctionSpace, cells: NDArray[np.int32] | None = None) -> fem.FunctionSpace:

@@ -21,7 +21,7 @@ from cutsim.base.parameters import with_constants
 from cutsim.base.terms import Term
 from cutsim.fields.points import FacetPoints, Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
-from cutsim.fields.space import crack_measure_entities
+from cutsim.fields.space import check_cracked, crack_measure_entities
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw, process_zone_element
 from cutsim.interface.contact import PenaltyContact
@@ -97,6 +97,7 @@ class Crack(Term):
         self._current = normal == "current"
         self._allowed_penetration = penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
+        check_cracked(state.V, facets, name)
         self.points = FacetPoints(
             state.mesh, np.asarray(facets, dtype=np.int32), state.measures.interior(self.entities), interior=True
         )

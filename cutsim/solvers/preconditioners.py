@@ -221,6 +221,8 @@ class LaggedPC:
 
     def setUp(self, pc: PETSc.PC) -> None:
         """Called by PETSc when the tangent has changed."""
+        if self._inner is not None and self._inner.getFailedReason():
+            self._free()  # set up again for an unchanged tangent it would forget that it has no factor
         if self._inner is None:
             self._inner = _create_pc(self._prefix, *pc.getOperators())
             self._stale = True

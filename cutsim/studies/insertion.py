@@ -37,7 +37,8 @@ from cutsim.tools.tool_parts import PARTS, ToolParts
 # measured: stiff enough for the force, soft enough for Newton's method; a needle is pressed harder than a blade, all
 # along its shaft (penalty times h over E, blend over tip radius)
 _CONTACT = {Blade: (5.0, 0.4), Needle: (20.0, 0.1)}
-_ENDLESS = 1e3
+# way of an endless push over the depth of the tip when it begins
+_ENDLESS = 1e6
 #: Depth of the tip, as a part of the depth of the notch, when the push begins.
 TIP_IN_NOTCH = 0.8
 #: Face of the crack, side of the tool that it meets, name.
@@ -270,7 +271,7 @@ def tool_path(tool: Blade | Needle, side: int, way: tuple[float, float, float | 
     tip, insertion, turn = way
     start = (-side * tool.half_width(tip), -tip, 0.0) if side else (0.0, 0.0, 0.0)
     depths = [tip, *([] if turn is None else [turn, tip])]
-    depths.append(depths[-1] + _ENDLESS)
+    depths.append(depths[-1] + _ENDLESS * tip)
     times = [0.0, *(insertion + np.cumsum(np.abs(np.diff(depths, prepend=tip))))]
     rows = [start, *((0.0, -depth, 0.0) for depth in depths)]
     return Path.polyline(times, [row[:gdim] for row in rows])

@@ -1,0 +1,149 @@
+"""Bodies that nothing holds, loads that nothing carries, cracks that cannot open: refused by name."""
+
+import basix.ufl
+import numpy as np
+import pytest
+from conftest import EXPONENTIAL, NU, E, make_blocks
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, StepError, run
+from cutsim.base.compat import create_mesh
+from cutsim.bodies.loads import Support, Traction
+from cutsim.bodies.solid import Solid
+from cutsim.fields.pieces import connected_pieces
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.interface.cohesive import Exponential
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack import Crack
+from cutsim.materials.elastic import NeoHookean
+
+COMM = MPI.COMM_WORLD
+GEL = NeoHookean(E, NU)
+
+
+def square(gdim=2, n=4):
+    cell = (mesh.CellType.quadrilateral, mesh.CellType.hexahedron)[gdim - 2]
+    create = (mesh.create_unit_square, mesh.create_unit_cube)[gdim - 2]
+    domain = create(COMM, *(n,) * gdim, cell, ghost_mode=mesh.GhostMode.shared_facet)
+    return State(fem.functionspace(domain, ("Lagrange", 1, (gdim,))))
+
+
+def where(state, dim, place):
+    return mesh.locate_entities_boundary(state.mesh, dim, place)
+
+
+def side(axis, at):
+    return lambda x: np.isclose(x[axis], at)
+
+
+HELD = {
+    "nowhere": ([], 2, "slide along x and y and turn"),
+    "along x": ([(side(0, 0), 1, (0,))], 2, "slide along y"),
+    "in a corner": ([(lambda x: side(0, 0)(x) & side(1, 0)(x), 0, (0, 1))], 2, "turn"),
+    "on a floor": ([(side(2, 0), 2, (2,))], 3, "slide along x and y and turn"),
+    "against turning only": ([(side(0, 0), 2, (0,)), (side(1, 0), 2, (1,))], 3, "slide along z"),
+}
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("case", HELD)
+def test_what_is_free_is_named(case):
+    held, gdim, motion = HELD[case]
+    state = square(gdim, 2)
+    supports = [Support(state, where(state, dim, at), i, dim=dim) for at, dim, axes in held for i in axes]
+    load = Traction(state, where(state, gdim - 1, side(0, 1)), (0, -0.05, 0)[:gdim], lambda t: t)
+    mechanics = Mechanics(state, [Solid(state, GEL, name="gel"), load], supports)
+    with pytest.raises(ValueError, match=f"body 'gel' can {motion}: neither"):
+        run(mechanics, 1.0, StepControl.fixed(1.0))
+    assert not state.u.x.array.any()
+
+
+@pytest.mark.mpi
+def test_a_body_that_is_held_is_let_run():
+    """Held along a slanted face in the corners: three constraints are enough in the plane."""
+    state = square()
+    supports = [Support(state, where(state, 1, side(0, 0)), 0)]
+    supports.append(Support(state, where(state, 0, lambda x: side(0, 1)(x) & side(1, 0)(x)), 1, dim=0))
+    load = Traction(state, where(state, 1, side(0, 1)), (0.0, -0.01), lambda t: t)
+    mechanics = Mechanics(state, [Solid(state, GEL), load], supports)
+    assert run(mechanics, 1.0, StepControl.fixed(1.0)).outcome.converged
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("held_by", ["bond", "overlap", "nothing", "touch"])
+def test_cracks_and_contacts_hold_what_they_resist(held_by):
+    """An upper block that only the crack below it can hold."""
+    b = make_blocks()
+    crack = b.crack(EXPONENTIAL if held_by == "bond" else None, contact=PenaltyContact(30.0))
+    supports = [*b.drive(b.lower, [0.0, 0.0]), Support(b.state, b.face(1, 1.0), 0)]
+    load = Traction(b.state, b.face(1, 1.0), (0.0, -0.1), lambda t: t)
+    if held_by in ("overlap", "nothing"):
+        gap = -1e-3 if held_by == "overlap" else 1e-3
+        b.move(lambda x: 0 * x, lambda x: np.array([0 * x[0], 0 * x[0] + gap]))
+        b.state.commit()
+    mechanics = Mechanics(b.state, [b.solid(GEL, name="upper"), crack, load], supports)
+    if held_by in ("bond", "overlap"):
+        assert run(mechanics, 1.0, StepControl.fixed(0.5)).outcome.converged
+    else:
+        with pytest.raises(ValueError, match=r"the piece around \(0.5, 0.75\).* can slide along y"):
+            run(mechanics, 1.0, StepControl.fixed(0.5))
+
+
+@pytest.mark.mpi
+def test_a_load_beyond_the_strength_has_no_equilibrium():
+    """A bond of strength 0.1 under a dead load that grows to 0.12: it ends near 0.1, and says why."""
+    b = make_blocks()
+    law = Exponential.from_parameters(strength=0.1, toughness=0.01)
+    supports = [*b.drive(b.lower, [0.0, 0.0]), Support(b.state, b.face(1, 1.0), 0)]
+    load = Traction(b.state, b.face(1, 1.0), (0.0, 0.12), lambda t: t, name="pull")
+    mechanics = Mechanics(b.state, [b.solid(GEL), b.crack(law), load], supports)
+    with pytest.raises(StepError, match=r"no equilibrium under more of pull \(a limit point\)"):
+        run(mechanics, 1.0, StepControl(0.05, 0.05))
+    assert 0.8 < b.state.time_old < 0.1 / 0.12 + 1e-6
+    assert np.abs(b.state.u.x.array).max() < 1.0
+
+
+def test_a_crack_needs_a_space_that_is_cracked_there():
+    domain = square().mesh
+    middle = mesh.locate_entities(domain, 1, side(1, 0.5))
+    state = State(cracked_space(domain, ("Lagrange", 1, (2,)), middle[:3]))
+    with pytest.raises(ValueError, match=r"'cut': the space is not cracked along 1 of 4 .* one of which is at"):
+        Crack(state, middle, (0.0, 1.0), EXPONENTIAL, young=E, name="cut")
+    with pytest.raises(ValueError, match="not cracked along 4 of 4"):
+        Crack(square(), middle, (0.0, 1.0), EXPONENTIAL, young=E, name="cut")
+
+
+def test_a_facet_has_one_law():
+    b = make_blocks()
+    one, two = b.crack(EXPONENTIAL, name="one"), b.crack(EXPONENTIAL, name="two")
+    with pytest.raises(ValueError, match=r"'one' and 'two'.* without common facets, not 2"):
+        Mechanics(b.state, [b.solid(), one, two], b.drive(b.lower, [0.0, 0.0]))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("split", [False, True])
+def test_pieces(split):
+    """Two squares side by side that share no node, one of them cracked through."""
+    n = 4
+    i, j = np.meshgrid(np.arange(n), np.arange(n), indexing="ij")
+    first = (i * (n + 1) + j).ravel()
+    cells = np.stack([first, first + 1, first + n + 1, first + n + 2], axis=1)
+    ticks = np.linspace(0, 1, n + 1)
+    grid = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2)
+    cells, x = np.vstack([cells, cells + len(grid)]), np.vstack([grid, grid + np.array([2.0, 0.0])])
+    here = slice(None) if COMM.rank == 0 else slice(0)
+    element = basix.ufl.element("Lagrange", "quadrilateral", 1, shape=(2,))
+    domain = create_mesh(COMM, cells[here].astype(np.int64), x[here], element)
+    space = fem.functionspace(domain, ("Lagrange", 1, (2,)))
+    if split:
+        middle = mesh.locate_entities(domain, 1, lambda x: np.isclose(x[1], 0.5) & (x[0] < 1.5))
+        space = cracked_space(domain, ("Lagrange", 1, (2,)), middle)
+    count, piece = connected_pieces(space)
+    assert count == 2 + split
+    right = space.tabulate_dof_coordinates()[:, 0] > 1.5
+    for inside in (right, ~right):
+        found = set().union(*COMM.allgather(set(piece[inside].tolist())))
+        assert len(found) == (1 if inside is right else 1 + split)
