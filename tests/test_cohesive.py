@@ -72,12 +72,14 @@ def damage(law, opening, sliding):
     return law.damage(*law.secants(np.asarray(opening, dtype=float), np.asarray(sliding, dtype=float)))
 
 
-def test_damage_is_the_loss_of_secant_stiffness():
-    """Thesis 4.26, 4.27: in pure modes 1 − exp(1 − x) and 1 − exp(1 − y²), from x = δ_n/ε_n = 1 and y = δ_t/ε_t = 1."""
+def test_damage_of_the_exponential_law_is_its_loss_of_strength():
+    """1 − T/t after the peak of each pure mode (thesis 4.26, 4.27)."""
     law = EXPONENTIAL
-    x, y = np.array([0.999, 1.5, 2, 3, 5]), np.array([0.999, 1.5, 2])
-    np.testing.assert_allclose(damage(law, x * law.eps_n, 0 * x)[0], [0, 0.393, 0.632, 0.865, 0.982], atol=5e-4)
-    np.testing.assert_allclose(damage(law, 0 * y, y * law.eps_t)[1], [0, 0.713, 0.950], atol=5e-4)
+    x, y = np.array([0.5, 1, 1.5, 2, 3, 5, 800]), np.array([0.5, sqrt(0.5), 1.0, 1.5, 2, 40])
+    opened = np.where(x > 1, 1 - x * np.exp(1 - x), 0)
+    slid = np.where(y > sqrt(0.5), 1 - sqrt(2) * y * np.exp(0.5 - y**2), 0)
+    np.testing.assert_allclose(damage(law, x * law.eps_n, 0 * x)[0], opened, atol=1e-12)
+    np.testing.assert_allclose(damage(law, 0 * y, y * law.eps_t)[1], slid, atol=1e-12)
 
 
 def test_damage_of_the_bilinear_law_is_its_loss_of_stiffness():

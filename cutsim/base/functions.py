@@ -18,6 +18,11 @@ def exp(x: Number) -> Number:
     return ufl.exp(x) if _symbolic(x) else np.exp(x) if isinstance(x, np.ndarray) else math.exp(x)
 
 
+def log(x: Number) -> Number:
+    """Natural logarithm."""
+    return ufl.ln(x) if _symbolic(x) else np.log(x) if isinstance(x, np.ndarray) else math.log(x)
+
+
 def sqrt(x: Number) -> Number:
     """Square root."""
     return ufl.sqrt(x) if _symbolic(x) else np.sqrt(x) if isinstance(x, np.ndarray) else math.sqrt(x)

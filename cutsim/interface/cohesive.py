@@ -13,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
-from cutsim.base.functions import exp, if_less, positive_part, sqrt
+from cutsim.base.functions import exp, if_less, larger, log, sqrt
 from cutsim.base.kinematics import Expr
 
+_BROKEN = 1e-300  # secant over the intact one that stands for nothing
+_REST = 1e-16  # keeps the derivative of a root finite where it vanishes
 _AGREE = 1e-3  # relative disagreement of strength, opening and toughness that is still rounding
 
 
@@ -153,13 +155,12 @@ class Exponential:
         return k_n, k_t
 
     def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
-        """Loss of secant stiffness after the characteristic jump of each mode (thesis 4.26, 4.27).
-
-        In pure modes 1 − exp(1 − δ_n/ε_n) and 1 − exp(1 − δ_t²/ε_t²).
-        """
-        return positive_part(1 - k_n * self.eps_n / self.t_n), positive_part(
-            1 - k_t * self.eps_t / (sqrt(2 / e) * self.t_t)
-        )
+        """Loss of strength after the peak of each mode, of a bond with these secants in that mode alone."""
+        normal = -log(larger(k_n * self.eps_n / (e * self.t_n), _BROKEN))
+        sliding = sqrt(-log(larger(k_t * self.eps_t / (sqrt(2 * e) * self.t_t), _BROKEN)) + _REST)
+        D_n = 1 - normal * exp(1 - normal)
+        D_t = 1 - sqrt(2) * sliding * exp(0.5 - sliding**2)
+        return if_less(1.0, normal, D_n, 0.0), if_less(1 / sqrt(2), sliding, D_t, 0.0)
 
 
 class ByToughness:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
+from cutsim.base.functions import larger
 from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
 from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
@@ -160,7 +161,7 @@ class Crack(Term):
             "jump": ufl.as_vector([r.opening, *(ufl.dot(r.jump, a) for a in self.frame(u_s))]),
             "contact_power": -r.pressure * ufl.dot(r.normal, increment),
             "stored": 0.5 * ufl.dot(r.cohesive, r.jump),
-            "damage": r.damage[0],
+            "damage": larger(*r.damage),
             "opening": r.opening,
             "sliding": r.sliding,
             "pressure": r.pressure,

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
+from cutsim.base.functions import larger
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
@@ -68,7 +69,7 @@ class PairLaw:
             "secants": ufl.as_vector([*r.secants]),
             "jump": ufl.as_vector([jump[i] for i in range(self._dim)]),
             "stored": 0.5 * ufl.dot(ufl.as_vector([r.tension, *shear]), jump),
-            "damage": r.damage[0],
+            "damage": larger(*r.damage),
             "sliding": r.sliding,
             "pressure": r.pressure,
             "held": contact.energy(-jump[0]),

@@ -199,7 +199,7 @@ class NonlinearProblem:
         self._f = self._x.duplicate()
         self._n_dofs = self._x.size
         self._free = np.setdiff1d(np.arange(self._x.local_size), self._forces.held)
-        self._previous_scale = 0.0
+        self._previous_scale = self._size = 0.0
         cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
         h = np.max(mesh.h(mesh.topology.dim, cells), initial=0.0)
         self._h = self._comm.allreduce(h, MPI.MAX)
