@@ -134,7 +134,7 @@ def test_another_line_search_saves_the_step():
     watch = Failing(mechanics, lambda call: call == 1)
     report = run(mechanics, 0.1, StepControl.fixed(0.1))
     assert report.cuts == 0
-    assert watch.searches == ["bt", "l2"]
+    assert watch.searches == ["l2", "bt"]
 
 
 def test_smallest_step_is_named_and_history_is_kept(tmp_path):

@@ -140,11 +140,6 @@ class Mechanics:
         if self.inertia is not None:
             self.problem.known[:] = self.inertia.history(self._residual_old)
 
-    def predict(self) -> None:
-        """Start the search for equilibrium where the last step leads; with inertia the velocity does so already."""
-        if self.inertia is None:
-            self.state.predict()
-
     def _start(self, inertia: Inertia, end: float) -> None:
         """Motion, forces and energies at the start of a dynamic analysis whose first step ends at a time."""
         for term in self._static:

@@ -77,10 +77,6 @@ class ThermoMechanics:
         """Start a trial step that ends at `time`."""
         self.mechanics.begin(time)
 
-    def predict(self) -> None:
-        """Start the search for equilibrium from where the last step leads."""
-        self.mechanics.predict()
-
     def solve(self, line_search: str | None = None) -> Outcome:
         """Find equilibrium and temperature. Collective.
 

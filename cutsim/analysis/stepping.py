@@ -75,9 +75,6 @@ class Problem(Protocol):
     def begin(self, time: float) -> None:
         """Start a trial step that ends at `time`."""
 
-    def predict(self) -> None:
-        """Start the search for the trial state from where the last step leads."""
-
     def solve(self, line_search: str | None = None) -> Outcome:
         """Solve the trial step. Collective."""
 
@@ -117,8 +114,7 @@ class StepControl:
         easy: Newton iterations up to which a step counts as easy.
         damage: Largest growth of damage at a point in a step, in (0, 1]; None for no limit.
         closure: Largest change of the energy audit's relative closure in a step; None for no limit.
-        line_searches: Line searches tried in turn for the same step. For tools the default is best; for cracks in
-            stiff, slender bodies ("basic", "l2", "bt").
+        line_searches: Line searches tried in turn for the same step.
 
     Raises:
         ValueError: A value is outside its range.
@@ -132,7 +128,7 @@ class StepControl:
     easy: int = 6
     damage: float | None = None
     closure: float | None = None
-    line_searches: tuple[str, ...] = ("bt", "l2")
+    line_searches: tuple[str, ...] = ("l2", "bt")
 
     def __post_init__(self) -> None:
         require("first", self.first, self.first > 0, "> 0")
@@ -206,29 +202,26 @@ def run(
     problem.check()
     corners = [c for c in (*problem.corners, until) if c <= until]
     dt, report, number = control.first, None, 0
-    smooth = False  # whether the last step tells where the next one leads
     with _interruptible(state.mesh.comm) as interrupted:
         while ahead := [c for c in corners if c > state.time_old + _ROUNDING * control.smallest]:
             corner = min(ahead)
-            report = _advance(problem, control, dt, corner, predict=smooth)
+            report = _advance(problem, control, dt, corner)
             number += 1
             report.number = number
             record(report)
             if stop(report) or interrupted():
                 break
-            at_corner = state.time_old == corner
-            dt = _next_step(control, report, dt, at_corner=at_corner)
-            smooth = not at_corner and not report.cuts
+            dt = _next_step(control, report, dt, at_corner=state.time_old == corner)
     return report
 
 
-def _advance(problem: Problem, control: StepControl, dt: float, corner: float, *, predict: bool) -> StepReport:
-    """One accepted step of at most dt that does not pass the corner; its first try may be predicted."""
+def _advance(problem: Problem, control: StepControl, dt: float, corner: float) -> StepReport:
+    """One accepted step of at most dt that does not pass the corner."""
     state, cuts = problem.state, 0
     while True:
         start = state.time_old
         end = corner if start + (1 + _SLIVER) * dt >= corner else start + dt
-        outcome, refusal = _attempt(problem, control, end, predict=predict and not cuts)
+        outcome, refusal = _attempt(problem, control, end)
         if refusal is None:
             size = end - start
             problem.commit()
@@ -245,14 +238,12 @@ def _advance(problem: Problem, control: StepControl, dt: float, corner: float, *
             )
 
 
-def _attempt(problem: Problem, control: StepControl, end: float, *, predict: bool) -> tuple[Outcome, str | None]:
+def _attempt(problem: Problem, control: StepControl, end: float) -> tuple[Outcome, str | None]:
     """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
     before = problem.audit.closure
-    for retry, line_search in enumerate(control.line_searches):
+    for line_search in control.line_searches:
         problem.rollback()
         problem.begin(end)
-        if predict and not retry:
-            problem.predict()
         outcome = problem.solve(line_search)
         failure = _failure(problem, outcome)
         if failure is None:

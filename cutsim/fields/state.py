@@ -45,16 +45,11 @@ class State:
         self.time = 0.0
         self.time_old = 0.0
         self._dt_old = float(self.dt.value)
-        self._rate = np.zeros_like(self.u.x.array)
 
     def begin(self, time: float) -> None:
         """Start a step that ends at `time`; the trial displacement starts from the committed one."""
         self.time = time
         self.dt.value = time - self.time_old
-
-    def predict(self) -> None:
-        """Let the trial displacement go on at the rate of the last committed step."""
-        self.u.x.array[:] = self.u_old.x.array + float(self.dt.value) * self._rate
 
     def rollback(self) -> None:
         """Restore the committed displacement and time bit for bit."""
@@ -64,8 +59,6 @@ class State:
 
     def commit(self) -> None:
         """Adopt the trial displacement and time."""
-        if self.time > self.time_old:
-            self._rate = (self.u.x.array - self.u_old.x.array) / (self.time - self.time_old)
         self.u_old.x.array[:] = self.u.x.array
         self.time_old = self.time
         self._dt_old = float(self.dt.value)

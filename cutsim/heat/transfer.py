@@ -106,9 +106,6 @@ class HeatTransfer:
         for part in self._parts:
             part.begin(time)
 
-    def predict(self) -> None:
-        """Nothing: the problem is linear, and found in one iteration from anywhere."""
-
     def solve(self, line_search: str | None = None) -> Outcome:
         """Find the temperature at the end of the step. Collective.
 
