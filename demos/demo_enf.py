@@ -170,8 +170,12 @@ class Beam:
         return cls(state, solid, faces, bond, Mechanics(state, [solid, *cracks, *rubbing], supports))
 
     def columns(self, columns: Columns) -> Columns:
-        """Deflection and load per width, sliding above the left pin, and the front. Collective."""
-        front = {"front": (crack_front(self.bond), "length")} if self.bond else {}
+        """Deflection and load per width, sliding above the left pin, and the front. Collective.
+
+        The sharp front of theory is where the bond carries its strength: where it slides by ε_t/√2.
+        """
+        at_strength = self.bond and crack_front(self.bond, 0, "sliding", self.bond.law.eps_t / np.sqrt(2))
+        front = {"front": (at_strength, "length")} if self.bond else {}
         return front | {
             "deflection": (-columns["load_displacement"][0], "length"),
             "load": (-columns["load_force"][0], "toughness"),

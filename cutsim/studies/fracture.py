@@ -135,10 +135,17 @@ def crack_profile(crack: Crack, name: str, axis: int = 0) -> tuple[Array, Array]
     return places, np.bincount(column, values) / np.bincount(column)
 
 
-def crack_front(crack: Crack, axis: int = 0) -> float:
-    """Place where the damage falls below one half along a coordinate, in which the crack grows [length]. Collective."""
-    places, damage = crack_profile(crack, "damage", axis)
-    return float(np.interp(-0.5, -damage, places))
+def crack_front(crack: Crack, axis: int = 0, name: str = "damage", level: float = 0.5) -> float:
+    """Place where a quantity falls below a level along the coordinate in which the crack grows [length]. Collective.
+
+    Args:
+        crack: The crack.
+        axis: The coordinate.
+        name: As for `Crack.point_values`.
+        level: Level; by default the front is where the damage is one half.
+    """
+    places, values = crack_profile(crack, name, axis)
+    return float(np.interp(-level, -values, places))
 
 
 def plane_modulus(young: float, poisson: float, plane: Literal["strain", "stress"] = "strain") -> float:
