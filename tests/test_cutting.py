@@ -119,3 +119,42 @@ def test_parameters_are_refused_by_name():
     cut = build(lc=0.25, H=3.0)
     with pytest.raises(ValueError, match=r"depth = 0\.1"):
         cut.time_of(0.1)
+
+
+@pytest.mark.parametrize(
+    ("block", "tool", "options", "message"),
+    [
+        ({}, {}, {"notch": 1.5}, r"notch = 1.5 .* 0.5, the depth of the group 'notch'"),
+        ({}, {"half_angle": 1.5}, {}, r"tool.half_angle = 1.5 .* in radians"),
+        ({"H": 2.0}, {}, {"depth": 2.5}, r"depth = 2.5 .*< 2, the height of the block"),
+        ({}, {"push": (0.0, -1.0, 0.0), "lateral": (1.0, 0.0, 0.0)}, {}, r"tool.push = .* of 2 components"),
+    ],
+    ids=["another notch", "degrees", "deeper than the block", "of another dimension"],
+)
+def test_what_does_not_fit_is_refused(block, tool, options, message):
+    block = {"dim": 2, "Lx": 2.0, "H": 3.0, "lc": 0.1, "band": 0.3, "growth": 1.4, "notch": 0.5} | block
+    tool = Blade(**{"half_angle": 0.2, "tip_radius": 0.1, "half_thickness": 0.3} | tool)
+    law = Exponential.from_parameters(strength=0.6, toughness=TOUGHNESS)
+    domain = read_geo(MESH, MPI.COMM_SELF, block, gdim=2)
+    with pytest.raises(ValueError, match=message):
+        Insertion.build(domain, NeoHookean(0.8, 0.45), law, tool, notch=options.get("notch", 0.5)).time_of(
+            options.get("depth", 1.0)
+        )
+
+
+def test_a_push_has_no_end_in_any_unit():
+    """The same cut in µm and kPa: the tool arrives where it is pushed to, and the curve is the same."""
+    curves = []
+    for length in (1.0, 1e3):
+        block = {"dim": 2, "Lx": 2, "H": 3, "lc": 0.1, "band": 0.3, "growth": 1.4, "notch": 0.5}
+        scaled = {
+            name: value * (length if name in ("Lx", "H", "lc", "band", "notch") else 1) for name, value in block.items()
+        }
+        domain = read_geo(MESH, MPI.COMM_SELF, scaled, gdim=2)
+        law = Exponential.from_parameters(strength=0.6, toughness=0.2 * length)
+        tool = Blade(0.2, 0.1 * length, 0.3 * length)
+        cut = Insertion.build(domain, NeoHookean(0.777, 0.45), law, tool, notch=0.5 * length, insertion=length)
+        rows = push(cut, 0.9 * length, StepControl(0.1 * length, 0.1 * length))
+        assert rows["depth"][-1] == pytest.approx(0.9 * length)
+        curves.append(rows["force"] / length)
+    np.testing.assert_allclose(curves[1], curves[0], rtol=1e-6, atol=1e-9)

@@ -14,6 +14,7 @@ import numpy as np
 from dolfinx.mesh import (
     Mesh,
     MeshTags,
+    entities_to_geometry,
     locate_entities,
     meshtags,
 )
@@ -55,6 +56,14 @@ class TaggedMesh:
             ValueError: If no group of cells has this name.
         """
         return self._find(name, self.cell_tags)
+
+    def extent(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest corner of the box around a group of facets [length]. Collective."""
+        facets, low, high = self.facets(name), np.full(3, np.inf), np.full(3, -np.inf)
+        if len(facets):
+            nodes = entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
+            low, high = (pick(self.mesh.geometry.x[nodes.ravel()], axis=0) for pick in (np.min, np.max))
+        return self.mesh.comm.allreduce(low, MPI.MIN), self.mesh.comm.allreduce(high, MPI.MAX)
 
     def facets(self, name: str) -> NDArray[np.int32]:
         """Local indices, ghosts included, of the facets of a group.

@@ -37,6 +37,7 @@ from cutsim.tools.tool_parts import PARTS, ToolParts
 # measured: stiff enough for the force, soft enough for Newton's method; a needle is pressed harder than a blade, all
 # along its shaft (penalty times h over E, blend over tip radius)
 _CONTACT = {Blade: (5.0, 0.4), Needle: (20.0, 0.1)}
+_WIDEST = np.pi / 3
 # way of an endless push over the depth of the tip when it begins
 _ENDLESS = 1e6
 #: Depth of the tip, as a part of the depth of the notch, when the push begins.
@@ -89,6 +90,7 @@ class Insertion:
         insertion: Duration of the insertion [time].
         tip: Depth of the tip when the push begins [length].
         turn: Depth at which the tool turns back to where the push began, to be pushed once more; None if it does not.
+        height: Height of the block [length].
         whole: Factor from the meshed part to the whole block.
         separation: Table of the law, opening → fraction of the toughness spent.
     """
@@ -105,6 +107,7 @@ class Insertion:
     insertion: float
     tip: float
     turn: float | None
+    height: float
     whole: float
     separation: tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -141,12 +144,11 @@ class Insertion:
             ValueError: A parameter is outside its range or the mesh lacks a group.
         """
         tip = TIP_IN_NOTCH * notch
-        require("notch", notch, notch > tool.tip_radius, f"> the tool's tip radius {tool.tip_radius}")
+        _check_tool(tool, notch, domain.mesh.geometry.dim)
         require("friction", friction, friction >= 0, ">= 0")
         require("insertion", insertion, insertion > 0, "> 0")
         require("turn", turn, turn is None or turn > tip, f"> {tip}, where the push begins, or None")
-        require("tool.side", tool.side, tool.side == 0, "0, the whole tool")
-        require("tool.push", tool.push, tool.push[1] == -1, "along −y")
+        height = check_block(domain, notch)
         mesh, revolved = domain.mesh, isinstance(tool, Needle) and domain.mesh.geometry.dim == 2
         state = State(cracked_space(mesh, ("Lagrange", 1, (mesh.geometry.dim,)), _slit(domain)), axisymmetric=revolved)
         solid = Solid(state, material, name="block", viscosity=viscosity)
@@ -175,7 +177,21 @@ class Insertion:
         whole = 2.0 if "symmetry" in domain.names else 1.0
         table = separation_curve(law)
         return cls(
-            domain, state, mechanics, solid, crack, halves, parts, plate, tool, insertion, tip, turn, whole, table
+            domain,
+            state,
+            mechanics,
+            solid,
+            crack,
+            halves,
+            parts,
+            plate,
+            tool,
+            insertion,
+            tip,
+            turn,
+            height,
+            whole,
+            table,
         )
 
     def time_of(self, depth: float, push: int = 1) -> float:
@@ -185,6 +201,7 @@ class Insertion:
             ValueError: The push begins deeper, or there is no such push.
         """
         require("depth", depth, depth >= self.tip, f">= {self.tip}, where the push begins")
+        require("depth", depth, depth < self.height, f"< {self.height:g}, the height of the block")
         last = 1 if self.turn is None else 2
         require("push", push, push in range(1, last + 1), f"1 … {last}")
         back = 0.0 if self.turn is None or push == 1 else 2 * (self.turn - self.tip)
@@ -243,6 +260,34 @@ class Insertion:
 
 def _slit(domain: TaggedMesh) -> list[NDArray[np.int32]]:
     return [domain.facets("crack"), domain.facets("notch")]
+
+
+def check_block(domain: TaggedMesh, notch: float) -> float:
+    """Height of a block, which has to begin at y = 0 and to be notched as deep as it is said to be. Collective.
+
+    Args:
+        domain: The tagged mesh.
+        notch: Depth of the notch as the user gave it [length].
+
+    Raises:
+        ValueError: The mesh has its top elsewhere, or another notch.
+    """
+    top, bottom = domain.extent("top_right")[1][1], domain.extent("bottom")[0][1]
+    height = float(top - bottom)
+    require("domain", f"top at y = {top:g}", abs(top) <= 1e-6 * height, "a block whose top is at y = 0")
+    depth = float(top - domain.extent("notch")[0][1])
+    same = abs(notch - depth) <= 1e-3 * depth
+    require("notch", notch, same, f"{depth:g}, the depth of the group 'notch' in the mesh")
+    return height
+
+
+def _check_tool(tool: Blade | Needle, notch: float, gdim: int) -> None:
+    """Refuse a tool that does not fit the notch or the direction of the push."""
+    require("notch", notch, notch > tool.tip_radius, f"> the tool's tip radius {tool.tip_radius}")
+    require("tool.side", tool.side, tool.side == 0, "0, the whole tool")
+    down = len(tool.push) == gdim and tool.push[1] == -1
+    require("tool.push", tool.push, down, f"along −y, of {gdim} components")
+    require("tool.half_angle", tool.half_angle, tool.half_angle <= _WIDEST, "at most π/3: it is in radians")
 
 
 def soft_contact(tool: Blade | Needle, crack: Crack, young: float) -> PenaltyContact:

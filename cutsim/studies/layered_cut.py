@@ -9,7 +9,7 @@ from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.interface.crack import Crack
 from cutsim.results.recording import Columns
-from cutsim.studies.insertion import FACES, TIP_IN_NOTCH, soft_contact, tool_path
+from cutsim.studies.insertion import FACES, TIP_IN_NOTCH, check_block, soft_contact, tool_path
 from cutsim.studies.layered import LayeredBlock
 from cutsim.tools.pointed import Blade
 from cutsim.tools.tool_contact import ToolContact, warn_coarse
@@ -64,6 +64,7 @@ class LayeredCut:
         mouth, tip = block.notch, TIP_IN_NOTCH * notch
         if mouth is None:
             raise ValueError("block has no notch; allowed is one on a mesh that was made with a notch")
+        check_block(block.domain, notch)
         for crack in block.cracks:
             warn_coarse(crack.name, blade, crack.size)
         contacts = tuple(_half(block, blade, crack, tip, insertion, face) for face in FACES for crack in block.cracks)
