@@ -271,3 +271,9 @@ def test_refuses_ambiguous_names():
     with pytest.raises(ValueError, match="terms = 0 is not allowed"):
         Mechanics(b.state, [])
     assert isinstance(b.solid().residual(ufl.TestFunction(b.state.V)), ufl.Form)
+
+
+@pytest.mark.parametrize("step", [float("inf"), float("nan"), 0.0, -1.0])
+def test_a_step_is_positive_and_finite(step):
+    with pytest.raises(ValueError, match=f"step = {step} is not allowed: it must be .*> 0"):
+        StepControl.fixed(step)

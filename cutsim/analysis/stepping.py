@@ -145,6 +145,7 @@ class StepControl:
     @classmethod
     def fixed(cls, step: float) -> "StepControl":
         """Equal steps as long as they converge; a step that fails is cut, and later ones grow back."""
+        require("step", step, step > 0, "> 0")
         return cls(first=step, largest=step)
 
 

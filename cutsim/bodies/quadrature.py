@@ -24,14 +24,14 @@ def strain_energy_measures(
         material: Strain energy.
         volumetric: "reduced" for fewer points in the volumetric part; "auto" does so for ν ≥ 0.45.
         cells: Local cells of the body, all by default.
-        name: The body, in the warning that linear simplices lock.
+        name: The body, in the warning that a linear element locks.
     """
     element, nearly = state.V.ufl_element(), material.poisson >= NEARLY_INCOMPRESSIBLE
     cell, degree = element.cell_type.name, element.degree
     simplex = cell in ("triangle", "tetrahedron")
-    if nearly and simplex and degree == 1:
-        text = "%s: a linear %s locks at Poisson's ratio %.3g; use quadrilaterals, hexahedra or degree 2"
-        logger.warning(text, name, cell, material.poisson)
+    if nearly and degree == 1 and (simplex or volumetric == "full"):
+        cure = "quadrilaterals, hexahedra or degree 2" if simplex else "volumetric='auto' or degree 2"
+        logger.warning("%s: a linear %s locks at Poisson's ratio %.4g; use %s", name, cell, material.poisson, cure)
     reduced = volumetric == "reduced" or (volumetric == "auto" and nearly)
     # full integration: (degree + 1) points in each direction of a tensor-product cell, exact stiffness on simplices
     full = 2 * (degree - 1) if simplex else 2 * degree
