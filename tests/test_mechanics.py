@@ -199,3 +199,22 @@ def test_reactions_balance_a_dead_load():
 def test_refuses_bad_parameters(make, name):
     with pytest.raises(ValueError, match=f"{name} = .* is not allowed"):
         make(make_blocks())
+
+
+@pytest.mark.mpi
+def test_the_audit_of_a_loaded_state_begins_with_its_energy():
+    """A block is pulled until its bond softens, and drawn on by other supports: another problem on the same state."""
+    b = make_blocks(n=4)
+    terms = [b.solid(NeoHookean(E, NU)), b.crack(WEAK)]
+    base = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
+    first = Mechanics(b.state, terms, [*base, Support(b.state, b.face(1, 1.0), 1, lambda t: 0.3 * t)])
+    run(first, 1.0, StepControl.fixed(0.05))
+    sides = [
+        Support(b.state, b.face(1, 1.0), i, path) for i, path in ((0, lambda t: 0.1 * (t - 1)), (1, lambda t: 0.3 * t))
+    ]
+    second = Mechanics(b.state, terms, [*base, *sides])
+    rows = []
+    run(second, 1.2, StepControl.fixed(0.02), lambda report: rows.append(report.columns))
+    held = first.audit.entries["strain"] + first.audit.entries["cohesive_stored"] + first.audit.entries["fracture"]
+    assert rows[0]["energy_initial"][0] == pytest.approx(held, rel=1e-9) and held > 0.01
+    assert max(abs(row["energy_closure"][0]) for row in rows) < 5e-3

@@ -405,3 +405,13 @@ def test_a_source_left_half_built_is_removed(tmp_path):
         (tmp_path / name).touch()
     with jit_cache(MPI.COMM_SELF, tmp_path):
         assert {p.name for p in tmp_path.glob("*.c*")} == {"whole.c", "whole.c.cached"}
+
+
+@pytest.mark.mpi
+def test_a_cache_that_cannot_be_written_is_named_on_all_ranks(tmp_path):
+    (tmp_path / "file").touch()
+    with (
+        pytest.raises(RuntimeError, match=r"cannot be kept in .*: set XDG_CACHE_HOME"),
+        jit_cache(WORLD, tmp_path / "file" / "cache"),
+    ):
+        raise AssertionError("nothing is compiled")

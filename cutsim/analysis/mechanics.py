@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import ufl
 from dolfinx import cpp, la
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.analysis.energy import EnergyAudit
@@ -98,6 +99,7 @@ class Mechanics:
             largest=_RUNAWAY * extent(state.mesh.comm, state.mesh.geometry.x),
         )
         self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
+        self._begun = False
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
         self._residual_old: NDArray[np.float64] = self._residual
 
@@ -134,11 +136,21 @@ class Mechanics:
         """
         if self.inertia is not None and not self.inertia.started:
             self._start(self.inertia, time)
+        elif self.inertia is None and not self._begun:
+            self._take_over()
+        self._begun = True
         self.state.begin(time)
         for part in self._parts:
             part.begin(time)
         if self.inertia is not None:
             self.problem.known[:] = self.inertia.history(self._residual_old)
+
+    def _take_over(self) -> None:
+        """Forces and energies of a static state that others have loaded, or that was set."""
+        u = self.state.u_old.x.array
+        if self.state.mesh.comm.allreduce(bool(u.any()), MPI.LOR):
+            self._residual = self._residual_old = self._out_of_balance()
+            self.audit = self._trial_audit = self.audit.start([t.energies() for t in self.terms])
 
     def _start(self, inertia: Inertia, end: float) -> None:
         """Motion, forces and energies at the start of a dynamic analysis whose first step ends at a time."""

@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.assembly import box
 from cutsim.fields.pieces import connected_pieces
 from cutsim.fields.state import State
 
@@ -64,8 +65,7 @@ def free_motion(
 
 def extent(comm: MPI.Comm, x: Array) -> float:
     """Diagonal of the box around points, one a row. Collective."""
-    low = comm.allreduce(x.min(axis=0, initial=np.inf), op=MPI.MIN)
-    high = comm.allreduce(x.max(axis=0, initial=-np.inf), op=MPI.MAX)
+    low, high = box(comm, x)
     return float(np.linalg.norm(high - low))
 
 

@@ -40,6 +40,14 @@ def resultant(comm: MPI.Comm, forces: NDArray[np.float64], gdim: int) -> Array:
     return np.asarray(comm.allreduce(forces.reshape(-1, gdim).sum(axis=0), op=MPI.SUM))
 
 
+def box(comm: MPI.Comm, points: Array) -> tuple[Array, Array]:
+    """Lowest and highest corner of the box around the points of all ranks, one a row [length]."""
+    low, high = (np.array(pick(points, axis=0, initial=far)) for pick, far in ((np.min, np.inf), (np.max, -np.inf)))
+    comm.Allreduce(MPI.IN_PLACE, low, op=MPI.MIN)
+    comm.Allreduce(MPI.IN_PLACE, high, op=MPI.MAX)
+    return low, high
+
+
 def add_blocks(A: PETSc.Mat, dofs: NDArray[np.int64], blocks: Array) -> None:
     """Add dense blocks to a matrix, on rows of any rank. The caller assembles it.
 

@@ -48,12 +48,25 @@ def jit_cache(comm: MPI.Comm, directory: Path = CACHE_DIR) -> Iterator[None]:
     Args:
         comm: Communicator of the compilation; only its rank 0 compiles, so only that rank takes the lock.
         directory: The cache.
+
+    Raises:
+        RuntimeError: On all ranks, if the cache cannot be written.
     """
-    if comm.rank != 0:
+    lock, problem = None, None
+    if comm.rank == 0:
+        try:
+            directory.mkdir(parents=True, exist_ok=True)
+            lock = open(directory / "lock", "w")  # unlocked when the file is closed, also when the process dies
+        except OSError as error:
+            problem = str(error)
+    if (problem := comm.bcast(problem)) is not None:
+        raise RuntimeError(
+            f"compiled forms cannot be kept in {directory} ({problem}): set XDG_CACHE_HOME to another folder"
+        )
+    if lock is None:
         yield
         return
-    directory.mkdir(parents=True, exist_ok=True)
-    with open(directory / "lock", "w") as lock:  # unlocked when the file is closed, also when the process dies
+    with lock:
         if _clean.get(directory) != directory.stat().st_mtime_ns:
             _remove_abandoned(directory, lock)
         fcntl.flock(lock, fcntl.LOCK_SH)

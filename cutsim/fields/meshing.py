@@ -21,6 +21,7 @@ from dolfinx.mesh import (
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.assembly import box
 from cutsim.base.compat import model_to_mesh
 
 logger = logging.getLogger(__name__)
@@ -59,11 +60,10 @@ class TaggedMesh:
 
     def extent(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest corner of the box around a group of facets [length]. Collective."""
-        facets, low, high = self.facets(name), np.full(3, np.inf), np.full(3, -np.inf)
-        if len(facets):
-            nodes = entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets)
-            low, high = (pick(self.mesh.geometry.x[nodes.ravel()], axis=0) for pick in (np.min, np.max))
-        return self.mesh.comm.allreduce(low, MPI.MIN), self.mesh.comm.allreduce(high, MPI.MAX)
+        facets, nodes = self.facets(name), np.empty(0, dtype=np.int32)
+        if len(facets):  # entities_to_geometry of dolfinx 0.9 divides by their number
+            nodes = entities_to_geometry(self.mesh, self.mesh.topology.dim - 1, facets).ravel()
+        return box(self.mesh.comm, self.mesh.geometry.x[nodes])
 
     def facets(self, name: str) -> NDArray[np.int32]:
         """Local indices, ghosts included, of the facets of a group.
