@@ -122,7 +122,6 @@ def random_path(scale, legs=24, seed=3):
     return np.vstack([[0, 0], corners]) * scale
 
 
-@pytest.mark.mpi
 @pytest.mark.parametrize("law", LAWS)
 def test_no_column_of_dissipation_ever_falls(law):
     """Between rigid blocks the audit also closes, however the jump turns."""
