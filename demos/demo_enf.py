@@ -231,8 +231,8 @@ def before_growth(specimen: Specimen, friction: float) -> dict[str, float]:
 #
 # Theory has a sharp front in a bond that does not give.  Here the bond yields ahead of the crack before it breaks: the
 # beam is a little softer, the peak rounded and lower.  Once the process zone travels, load and deflection are those of
-# theory.  The front is taken where the bond carries its strength, at a slide of $\varepsilon_t/\sqrt2$: ahead of it the bond
-# still takes more, behind it gives way.
+# theory.  The front is taken where the bond carries its strength, at a slide of $\varepsilon_t/\sqrt2$: ahead of it
+# the bond still takes more, behind it gives way.
 
 
 def theory_curve(specimen: Specimen, friction: float) -> dict[str, np.ndarray]:
