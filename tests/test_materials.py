@@ -64,8 +64,10 @@ def number(expression):
 class Response:
     """Energy and first Piola–Kirchhoff stress of a material at a homogeneous deformation, compiled once."""
 
+    # one for all: a mesh holds communicators, and MPI has few
+    _mesh = mesh.create_unit_interval(MPI.COMM_SELF, 1)
+
     def __init__(self, material):
-        self._mesh = mesh.create_unit_interval(MPI.COMM_SELF, 1)
         self._F = fem.Constant(self._mesh, np.eye(3))
         F = ufl.variable(self._F)
         W = sum(with_constants(self._mesh, material).energy(F))

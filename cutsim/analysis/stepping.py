@@ -8,7 +8,7 @@ import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from math import isfinite
+from math import inf, isfinite
 from types import FrameType
 from typing import Protocol
 
@@ -131,8 +131,8 @@ class StepControl:
     line_searches: tuple[str, ...] = ("l2", "bt")
 
     def __post_init__(self) -> None:
-        require("first", self.first, self.first > 0, "> 0")
-        require("largest", self.largest, self.largest >= self.first, f">= first = {self.first}")
+        require("first", self.first, 0 < self.first < inf, "> 0 and finite")
+        require("largest", self.largest, self.first <= self.largest < inf, f">= first = {self.first} and finite")
         if not self.smallest:
             object.__setattr__(self, "smallest", 1e-3 * self.first)
         require("smallest", self.smallest, 0 < self.smallest <= self.first, f"in (0, first = {self.first}]")
@@ -145,7 +145,7 @@ class StepControl:
     @classmethod
     def fixed(cls, step: float) -> "StepControl":
         """Equal steps as long as they converge; a step that fails is cut, and later ones grow back."""
-        require("step", step, step > 0, "> 0")
+        require("step", step, 0 < step < inf, "> 0 and finite")
         return cls(first=step, largest=step)
 
 

@@ -1,7 +1,5 @@
 """One way to refuse bad input: the parameter, its value and what is allowed."""
 
-from math import isfinite
-from numbers import Real
 from typing import Any
 
 
@@ -15,9 +13,7 @@ def require(name: str, value: Any, valid: bool, allowed: str) -> None:
         allowed: What is admissible, in words that complete "must be …".
 
     Raises:
-        ValueError: ``valid`` is false, or the value is a number that is not finite.
+        ValueError: ``valid`` is false.
     """
-    if isinstance(value, Real) and not isfinite(value):
-        raise ValueError(f"{name} = {value!r} is not allowed: it must be finite, and {allowed}")
     if not valid:
         raise ValueError(f"{name} = {value!r} is not allowed: it must be {allowed}")

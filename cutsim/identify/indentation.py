@@ -58,7 +58,7 @@ def punch_force(
         ValueError: A number is outside its range.
     """
     require("radius", radius, radius > 0, "> 0")
-    require("thickness", str(thickness), thickness > 0, "> 0")  # np.inf is that of a half-space
+    require("thickness", thickness, thickness > 0, "> 0")
     return 4 * shear * radius * layer_factor(radius / thickness, poisson) / (1 - poisson) * np.asarray(depth)
 
 
