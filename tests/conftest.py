@@ -1,9 +1,11 @@
 """What the theory tests share: two blocks glued by a crack, their rigid motion, and slopes of remainders."""
 
+import gc
 from dataclasses import dataclass
 
 import mpi4py.MPI  # noqa: F401  # before dolfinx, as in cutsim
 import numpy as np
+import pytest
 from dolfinx import mesh
 from mpi4py import MPI
 
@@ -24,6 +26,13 @@ ELASTIC = LinearElastic(E, NU)
 EXPONENTIAL = Exponential.from_parameters(toughness=1.0, opening=0.1, shear_toughness=0.5, shear_opening=0.2)
 BILINEAR = Bilinear(penalty=200.0, t_n=2.0, G_I=0.2, t_t=3.0, G_II=0.5, eta=1.7)
 PPR = ParkPaulinoRoesler(t_n=2.0, G_I=0.2, t_t=3.0, G_II=0.5, alpha=3.0, beta=2.2, peak_n=0.15, peak_t=0.2)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _nothing_is_left():
+    """What a module has dropped is freed before the next one: MPICH has some two thousand communicators a process."""
+    yield
+    gc.collect()
 
 
 @dataclass(frozen=True)
