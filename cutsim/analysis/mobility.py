@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from cutsim.base.assembly import box
 from cutsim.fields.pieces import connected_pieces
 from cutsim.fields.state import State
+from cutsim.solvers.preconditioners import rigid_motions
 
 Array = NDArray[np.float64]
 
@@ -70,17 +71,11 @@ def extent(comm: MPI.Comm, x: Array) -> float:
 
 
 def _rigid_modes(x: Array, extent: float, *, axisymmetric: bool) -> Array:
-    """Translations, then rotations about the origin over the extent: shape (modes, nodes, components)."""
+    """Rigid motions, of equal size at the end of the body: shape (modes, nodes, components)."""
     gdim = x.shape[1]
-    translations = [np.tile(e, (len(x), 1)) for e in np.eye(gdim)]
-    if axisymmetric:
-        return np.array(translations[1:])
-    rotations = []
-    for i, j in [(0, 1), (1, 2), (2, 0)][: 1 if gdim == 2 else 3]:
-        rotation = np.zeros_like(x)
-        rotation[:, i], rotation[:, j] = -x[:, j] / extent, x[:, i] / extent
-        rotations.append(rotation)
-    return np.array(translations + rotations)
+    modes = rigid_motions(x)
+    modes[gdim:] /= extent
+    return modes[1:gdim] if axisymmetric else modes
 
 
 def _name(state: State, bodies: Mapping[str, NDArray[np.int32] | None], moves: NDArray[np.bool_], pieces: int) -> str:

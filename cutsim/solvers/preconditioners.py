@@ -134,16 +134,30 @@ def rigid_body_modes(V: fem.FunctionSpace) -> PETSc.NullSpace:
         raise ValueError(f"V has {bs} components in {gdim} dimensions: must be 2 in 2 or 3 in 3")
     n = V.dofmap.index_map.size_local
     x = V.tabulate_dof_coordinates()[:n, :gdim]
-    modes = [np.tile(e, (n, 1)) for e in np.eye(gdim)]
-    for i, j in [(0, 1), (1, 2), (2, 0)][: 1 if gdim == 2 else 3]:
-        rotation = np.zeros((n, gdim))
-        rotation[:, i], rotation[:, j] = -x[:, j], x[:, i]
-        modes.append(rotation)
+    modes = rigid_motions(x)
     vectors = [owned_vector(V.dofmap.index_map, bs) for _ in modes]
     for vector, mode in zip(vectors, modes, strict=True):
         vector.array[:] = mode.ravel()
     _orthonormalise(vectors)
     return PETSc.NullSpace().create(vectors=vectors, comm=V.mesh.comm)
+
+
+def rigid_motions(x: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Small rigid motions of points: translations along the axes, then rotations about the origin.
+
+    Args:
+        x: Positions in the plane or in space, one a row [length].
+
+    Returns:
+        Displacements, shape (3 or 6, points, components).
+    """
+    gdim = x.shape[1]
+    motions = [np.tile(e, (len(x), 1)) for e in np.eye(gdim)]
+    for i, j in [(0, 1), (1, 2), (2, 0)][: 1 if gdim == 2 else 3]:
+        rotation = np.zeros_like(x)
+        rotation[:, i], rotation[:, j] = -x[:, j], x[:, i]
+        motions.append(rotation)
+    return np.array(motions)
 
 
 def _orthonormalise(vectors: list[PETSc.Vec]) -> None:

@@ -86,13 +86,15 @@ class Residual:
 
     def _add_terms(self, lift: bool) -> None:
         """Add the forces of terms that assemble themselves, and the lifting of prescribed increments."""
-        jump = self._lifted.array
-        jump[:] = 0.0
-        jump[self.held] = -self.violation(self._u.x.array)
-        self._lifted.scatter_forward()
+        jump = None
+        if lift:
+            jump = self._lifted.array
+            jump[:] = 0.0
+            jump[self.held] = -self.violation(self._u.x.array)
+            self._lifted.scatter_forward()
         self._added.set(0.0)
         for term in self._terms:
-            term.add_forces(self._added, jump if lift else None)
+            term.add_forces(self._added, jump)
         self._added.assemble()
         self._r.array[: self.n] += self._added.array_r
 
