@@ -1,5 +1,6 @@
 """Geometries and tagged meshes: measures against closed form, sizes, and the refusal of bad input."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import dolfinx
@@ -11,6 +12,7 @@ from dolfinx import fem
 from dolfinx.mesh import CellType, GhostMode
 from mpi4py import MPI
 
+from cutsim.base.assembly import box
 from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_msh, tag_mesh
 from cutsim.fields.sizes import facet_size, global_range, normal_size
 
@@ -214,10 +216,6 @@ def write(folder, name, text):
 @pytest.mark.parametrize(
     ("groups", "message"),
     [
-        (
-            'Physical Surface("a") = {left[1], right[1]}; Physical Surface("b") = {left[1]};',
-            "'b' .* overlaps",
-        ),
         ('Physical Surface("a") = left[1]; Physical Surface("middle") = right[1];', "two .* called 'middle'"),
         (
             'Line(99) = {3, 1}; Physical Surface("a") = left[1]; Physical Surface("b") = right[1]; Foo;',
@@ -243,18 +241,122 @@ def test_read_msh_gives_the_same_mesh_as_its_geometry(tmp_path):
     groups = 'Physical Surface("a") = left[1]; Physical Surface("b") = right[1];'
     geo = write(tmp_path, "squares.geo", SQUARES + groups)
     msh = geo.with_suffix(".msh")
-    if COMM.rank == 0:
-        gmsh.initialize(interruptible=False)
-        gmsh.option.setNumber("General.Terminal", 0)
+
+    def draw():
         gmsh.open(str(geo))
         gmsh.model.mesh.generate(2)
-        gmsh.write(str(msh))
-        gmsh.finalize()
-    for tagged in (read_msh(msh, COMM, gdim=2), read_geo(geo, COMM, gdim=2)):
+
+    for tagged in (read_msh(drawn(msh, draw), COMM, gdim=2), read_geo(geo, COMM, gdim=2)):
         assert tagged.mesh.topology.index_map(2).size_global == 18
         assert measure(tagged.mesh, "dx", tagged.cells("a")) == pytest.approx(1)
         assert measure(tagged.mesh, "dx", tagged.cells("b")) == pytest.approx(2)
         assert measure(tagged.mesh, "dS", tagged.facets("middle")) == pytest.approx(1)
+
+
+def drawn(path, draw):
+    """The same file on all ranks, of a mesh that rank 0 makes in a session of its own."""
+    path = COMM.bcast(path)
+    if COMM.rank == 0:
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+        draw()
+        gmsh.write(str(path))
+        gmsh.finalize()
+    COMM.Barrier()
+    return path
+
+
+def slit(*, embed):
+    """The unit square with a line in the middle, which is a part of the mesh or only drawn on it; groups overlap."""
+    square = gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+    ends = [gmsh.model.occ.addPoint(x, 0.5, 0) for x in (0.25, 0.5, 0.75)]
+    lines = [gmsh.model.occ.addLine(*pair) for pair in pairwise(ends)]
+    gmsh.model.occ.synchronize()
+    gmsh.model.mesh.embed(1, lines[:embed], 2, square)
+    groups = {"body": (2, [square]), "again": (2, [square]), "crack": (1, lines), "half": (1, lines[:1])}
+    for name, (dim, entities) in groups.items():
+        gmsh.model.addPhysicalGroup(dim, entities, name=name)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", 0.125)
+    gmsh.model.mesh.generate(2)
+
+
+@pytest.mark.parametrize(("embed", "found"), [(0, "0 of 4"), (1, "2 of 4")])
+def test_a_crack_that_is_only_drawn_is_refused(tmp_path, embed, found):
+    path = drawn(tmp_path / "slit.msh", lambda: slit(embed=embed))
+    message = rf"group 'crack': {found} facets .* the others lie near .* to \(0.6875, 0.5, 0\).*Curve\{{…\}} In Surface"
+    with pytest.raises(ValueError, match=message):
+        read_msh(path, COMM, gdim=2)
+
+
+@pytest.mark.parametrize("ending", ["msh", "med", "unv"])
+def test_groups_overlap_and_nodes_have_any_numbers(tmp_path, ending):
+    def draw():
+        slit(embed=2)
+        tags = [int(tag) for tag in gmsh.model.mesh.getNodes()[0]]
+        gmsh.model.mesh.renumberNodes(tags, [100 + 7 * tag for tag in tags])
+
+    tagged = read_msh(drawn(tmp_path / f"slit.{ending}", draw), COMM, gdim=2)
+    for name in ("body", "again"):
+        assert measure(tagged.mesh, "dx", tagged.cells(name)) == pytest.approx(1)
+    assert measure(tagged.mesh, "dS", tagged.facets("crack")) == pytest.approx(0.5)
+    assert measure(tagged.mesh, "dS", tagged.facets("half")) == pytest.approx(0.25)
+
+
+def test_formats_without_groups_are_refused(tmp_path):
+    for ending in ("inp", "vtk", "feb", "geo"):
+        with pytest.raises(ValueError, match=rf"mesh.{ending}: gmsh reads no groups .* allowed are .msh, .med"):
+            read_msh(write(tmp_path, f"mesh.{ending}", ""), COMM)
+
+
+CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
+FAN = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
+
+
+def discrete(points, cells, kind):
+    """A mesh of given nodes and cells; points in the plane of x and y unless they have three coordinates."""
+    dim = gmsh.model.mesh.getElementProperties(kind)[1]
+    entity = gmsh.model.addDiscreteEntity(dim)
+    x = np.array([(*p, 0)[:3] for p in points], dtype=float)
+    gmsh.model.mesh.addNodes(dim, entity, list(range(1, len(x) + 1)), x.ravel())
+    gmsh.model.mesh.addElementsByType(entity, kind, [], (np.array(cells) + 1).ravel())
+    gmsh.model.addPhysicalGroup(dim, [entity], name="body")
+
+
+PRISM = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)]
+BROKEN = {
+    "no volume": ([*CORNERS, (0.5, 0)], FAN, 2, r"1 cells have no volume, the first at \(0.5, 0\)"),
+    "folded": ([*CORNERS, (0.5, -0.1)], FAN, 2, r"2 facets have both their cells on the same side"),
+    "not finite": ([*CORNERS, (0.5, np.nan)], FAN, 2, r"1 nodes .* not finite, the first \(0.5, nan, 0\)"),
+    "a node twice": ([*CORNERS, (0.5, 0.5)], [*FAN[:3], (3, 3, 4)], 2, "1 cells have a node twice"),
+    "a cell twice": ([*CORNERS, (0.5, 0.5)], [*FAN, FAN[0]], 2, "2 facets belong to more than two cells"),
+    "bow": ([CORNERS[i] for i in (0, 1, 3, 2)], [(0, 1, 2, 3)], 3, r"1 cells are folded .* \(0.5, 0.5\)"),
+    "dart": ([(0, 0), (1, 0), (0.1, 0.1), (0, 1), (1, 1)], [(0, 1, 2, 3), (1, 4, 3, 2)], 3, "1 pairs of cells share"),
+    "prism": (PRISM, [range(6)], 6, r"type 'Prism 6' \(1 of 1\) cannot be used: use tetrahedra .* or hexahedra"),
+    "incomplete": (
+        [*CORNERS, (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)], [range(8)], 16,
+        r"'Quadrilateral 8' \(1 of 1\) cannot be used: .* -order 1.*SecondOrderIncomplete = 0",
+    ),
+    "tilted": ([(*CORNERS[i], 0.1 * i) for i in range(3)], [(0, 1, 2)], 2, "not flat: z goes from 0 to 0.2"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_cells_that_are_none_are_refused_on_all_ranks(tmp_path, case):
+    points, cells, kind, message = BROKEN[case]
+    path = drawn(tmp_path / "broken.msh", lambda: discrete(points, [list(cell) for cell in cells], kind))
+    with pytest.raises(ValueError, match=message):
+        read_msh(path, COMM, gdim=2 + (case == "prism"))
+
+
+@pytest.mark.parametrize(("axis", "level"), [(1, 0.0), (0, 0.5), (2, 0.25)])
+def test_a_flat_mesh_may_lie_in_any_plane_of_two_axes(tmp_path, axis, level, caplog):
+    points = np.insert(np.array([*CORNERS, (0.5, 0.5)]) * (2.0, 1.0), axis, level, axis=1)
+    tagged = read_msh(drawn(tmp_path / "flat.msh", lambda: discrete(points, FAN, 2)), COMM, gdim=2)
+    assert measure(tagged.mesh, "dx", tagged.cells("body")) == pytest.approx(2)
+    low, high = box(COMM, tagged.mesh.geometry.x)
+    assert (low.tolist(), high.tolist()) == ([0, 0, 0], [2, 1, 0])
+    said = COMM.bcast(f"in the plane {'xyz'[axis]} = {level:g}:" in caplog.text)
+    assert said == (axis != 2)
 
 
 def halves(mesh) -> TaggedMesh:
@@ -274,14 +376,17 @@ def test_markers_tag_cells_and_facets(cell):
     assert measure(tagged.mesh, "ds", tagged.facets("far")) == pytest.approx(1)
 
 
-def test_bad_markers_are_refused():
+def test_bad_markers_are_refused_and_groups_may_overlap():
     mesh = dolfinx.mesh.create_unit_square(COMM, 4, 4)
     everything = {"all": lambda x: x[0] < 2}
     corner = {"corner": lambda x: (x[0] < 0.3) & (x[1] < 0.3)}  # on one rank only, if there are more
     with pytest.raises(ValueError, match="'gap' finds no entity of dimension 1"):
         tag_mesh(mesh, everything, {"gap": lambda x: x[0] > 2})
-    with pytest.raises(ValueError, match="'corner' finds entities of another group"):
-        tag_mesh(mesh, everything | corner, {})
+    tagged = tag_mesh(mesh, everything | corner, {})
+    counts = [
+        COMM.allreduce(int((tagged.cells(n) < mesh.topology.index_map(2).size_local).sum())) for n in tagged.names
+    ]
+    assert counts == [32, 2]
     with pytest.raises(ValueError, match=r"both have \['all'\]"):
         tag_mesh(mesh, everything, everything)
 

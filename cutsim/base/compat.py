@@ -14,7 +14,7 @@ import numpy as np
 import ufl
 from dolfinx import cpp, fem, graph
 from dolfinx.common import IndexMap
-from dolfinx.mesh import GhostMode, Mesh, MeshTags
+from dolfinx.mesh import GhostMode, Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -128,20 +128,6 @@ def create_mesh(
     """
     geometry = (x, element) if _BEFORE_0_10 else (element, x)
     return dolfinx.mesh.create_mesh(comm, cells, *geometry, cell_partitioner())
-
-
-def model_to_mesh(model: Any, comm: MPI.Comm, gdim: int) -> tuple[Mesh, MeshTags, MeshTags]:
-    """Distribute the gmsh model of rank 0: mesh, tags of cells, tags of facets. Collective."""
-    if _BEFORE_0_10:
-        from dolfinx.io import gmshio
-
-        mesh, cell_tags, facet_tags = gmshio.model_to_mesh(model, comm, 0, gdim, cell_partitioner())
-    else:
-        from dolfinx.io import gmsh
-
-        data = gmsh.model_to_mesh(model, comm, 0, gdim, cell_partitioner())
-        mesh, cell_tags, facet_tags = data.mesh, data.cell_tags, data.facet_tags
-    return mesh, cell_tags, facet_tags
 
 
 def geometry_nodes(mesh: Mesh) -> NDArray[np.int32]:

@@ -2,35 +2,32 @@
 
 from __future__ import annotations
 
-import logging
-import math
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import basix.ufl
 import gmsh
 import numpy as np
-from dolfinx.mesh import (
-    Mesh,
-    MeshTags,
-    entities_to_geometry,
-    locate_entities,
-    meshtags,
-)
+from dolfinx.mesh import Mesh, MeshTags, entities_to_geometry, locate_entities, meshtags
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import box
-from cutsim.base.compat import model_to_mesh
-
-logger = logging.getLogger(__name__)
+from cutsim.base.compat import create_mesh
+from cutsim.fields import gmsh_model
+from cutsim.fields.cells import check_cells
 
 # The geometries that come with cutsim: inside the installed package, beside it in a checkout.
 _PACKAGE = Path(__file__).parents[1]
 _GEOMETRIES = next((path for path in (_PACKAGE / "meshes", _PACKAGE.parent / "meshes") if path.is_dir()), _PACKAGE)
 
+# the tag of an entity in no group; gmsh has none below one
+_NONE = -1
+
 Marker = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
+#: Dimension and tag of a group.
+Group = tuple[int, int]
 
 
 @dataclass(frozen=True)
@@ -40,15 +37,18 @@ class TaggedMesh:
     Attributes:
         mesh: The mesh; from the readers below always with shared-facet ghosts, without which a crack along
             the border of two ranks would not know both its sides.
-        cell_tags: Tags of the cells.
-        facet_tags: Tags of the facets, exterior and interior.
+        cell_tags: Tags of the cells. A cell in several groups has the tag of the last of them.
+        facet_tags: Tags of the facets, exterior and interior, likewise.
         names: Name of each group -> (dimension, tag).
+        groups: Local entities, ghosts included, of each group by (dimension, tag): all of them, also where groups
+            overlap.
     """
 
     mesh: Mesh
     cell_tags: MeshTags
     facet_tags: MeshTags
-    names: Mapping[str, tuple[int, int]]
+    names: Mapping[str, Group]
+    groups: Mapping[Group, NDArray[np.int32]]
 
     def cells(self, name: str) -> NDArray[np.int32]:
         """Local indices, ghosts included, of the cells of a group.
@@ -56,7 +56,7 @@ class TaggedMesh:
         Raises:
             ValueError: If no group of cells has this name.
         """
-        return self._find(name, self.cell_tags)
+        return self._find(name, self.mesh.topology.dim)
 
     def extent(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest corner of the box around a group of facets [length]. Collective."""
@@ -71,14 +71,14 @@ class TaggedMesh:
         Raises:
             ValueError: If no group of facets has this name.
         """
-        return self._find(name, self.facet_tags)
+        return self._find(name, self.mesh.topology.dim - 1)
 
-    def _find(self, name: str, tags: MeshTags) -> NDArray[np.int32]:
-        known = {key: tag for key, (dim, tag) in self.names.items() if dim == tags.dim}
+    def _find(self, name: str, dim: int) -> NDArray[np.int32]:
+        known = [key for key, (d, _) in self.names.items() if d == dim]
         if name not in known:
-            kind = "cells" if tags.dim == self.mesh.topology.dim else "facets"
+            kind = "cells" if dim == self.mesh.topology.dim else "facets"
             raise ValueError(f"name = {name!r} is no group of {kind}; known: {', '.join(known) or 'none'}")
-        return tags.find(known[name])
+        return self.groups[self.names[name]]
 
 
 def geometry(name: str) -> Path:
@@ -108,14 +108,16 @@ def read_geo(
         gdim: Dimension of the mesh and of its space, 2 or 3.
 
     Raises:
-        ValueError: On all ranks, if a parameter is unknown, gmsh fails, or the groups make no mesh of one
-            cell type.
+        ValueError: On all ranks, if a parameter is unknown, gmsh fails, or the groups are refused as by `read_msh`.
     """
-    return _read(path, comm, gdim, lambda: _generate(path, parameters or {}, gdim))
+    return _read(path, comm, gdim, lambda: gmsh_model.generate(path, parameters or {}, gdim))
 
 
 def read_msh(path: Path | str, comm: MPI.Comm, gdim: int = 3) -> TaggedMesh:
-    """Read a mesh that gmsh can open (.msh of any version, .med, .inp, …). Collective.
+    """Read a mesh with groups: .msh of any version, .med, .unv or .cgns. Collective.
+
+    Node numbers may have gaps, and groups may overlap. Of a flat mesh in the plane of x and z or of y and z these two
+    are the coordinates.
 
     Args:
         path: The file; its physical groups name the cells and facets, cells in no group are left out.
@@ -123,9 +125,11 @@ def read_msh(path: Path | str, comm: MPI.Comm, gdim: int = 3) -> TaggedMesh:
         gdim: Dimension of the mesh and of its space, 2 or 3.
 
     Raises:
-        ValueError: On all ranks, if gmsh cannot read the file or the groups make no mesh of one cell type.
+        ValueError: On all ranks, if gmsh cannot read the file, the cells are not of one type that can be used, are
+            folded or have no volume, a flat mesh is not in a plane of two axes, or facets of a group are none of the
+            mesh.
     """
-    return _read(path, comm, gdim, lambda: _open(path))
+    return _read(path, comm, gdim, lambda: gmsh_model.open_mesh(path))
 
 
 def tag_mesh(mesh: Mesh, cells: Mapping[str, Marker], facets: Mapping[str, Marker]) -> TaggedMesh:
@@ -134,121 +138,91 @@ def tag_mesh(mesh: Mesh, cells: Mapping[str, Marker], facets: Mapping[str, Marke
     Args:
         mesh: The mesh.
         cells: Name -> marker of points, from coordinates (3, n) to n booleans; a cell belongs to the group
-            when all its vertices do.
+            when all its vertices do. Groups may overlap.
         facets: The same for facets, exterior or interior.
 
     Raises:
-        ValueError: On all ranks, if a group is empty, two groups overlap or a name is used twice.
+        ValueError: On all ranks, if a group is empty, a name is used twice, or cells are folded or have no volume.
     """
+    check_cells(mesh)
     tdim = mesh.topology.dim
-    names: dict[str, tuple[int, int]] = {}
-    tags = []
+    names: dict[str, Group] = {}
+    groups: dict[Group, NDArray[np.int32]] = {}
     for dim, markers in ((tdim, cells), (tdim - 1, facets)):
-        tags.append(_tag(mesh, dim, markers))
         if twice := names.keys() & markers.keys():
             raise ValueError(f"names of cells and facets must differ, both have {sorted(twice)}")
-        names |= {name: (dim, tag) for tag, name in enumerate(markers, start=1)}
-    return TaggedMesh(mesh, tags[0], tags[1], names)
+        mesh.topology.create_entities(dim)
+        mesh.topology.create_connectivity(dim, tdim)
+        for tag, (name, marker) in enumerate(markers.items(), start=1):
+            names[name] = dim, tag
+            groups[dim, tag] = locate_entities(mesh, dim, marker)
+            if mesh.comm.allreduce(len(groups[dim, tag])) == 0:
+                raise ValueError(f"the marker of {name!r} finds no entity of dimension {dim}, at least one is needed")
+    return _tagged(mesh, names, groups)
 
 
-def _tag(mesh: Mesh, dim: int, markers: Mapping[str, Marker]) -> MeshTags:
-    """Tags 1, 2, … for the entities found by the markers, in their order."""
-    mesh.topology.create_entities(dim)
-    mesh.topology.create_connectivity(dim, mesh.topology.dim)
-    index_map = mesh.topology.index_map(dim)
-    values = np.zeros(index_map.size_local + index_map.num_ghosts, np.int32)
-    for tag, (name, marker) in enumerate(markers.items(), start=1):
-        entities = locate_entities(mesh, dim, marker)
-        if mesh.comm.allreduce(len(entities)) == 0:
-            raise ValueError(f"the marker of {name!r} finds no entity of dimension {dim}, at least one is needed")
-        if mesh.comm.allreduce(int(values[entities].any())):
-            raise ValueError(f"the marker of {name!r} finds entities of another group, which must not overlap")
-        values[entities] = tag
-    tagged = np.flatnonzero(values).astype(np.int32)
-    return meshtags(mesh, dim, tagged, values[tagged])
-
-
-@contextmanager
-def _gmsh_session() -> Iterator[None]:
-    """A quiet gmsh that reads no user configuration and leaves Ctrl-C alone; its warnings go to the log."""
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    gmsh.option.setNumber("General.Terminal", 0)
-    gmsh.logger.start()
-    try:
-        yield
-        for message in gmsh.logger.get():
-            if message.startswith("Warning"):
-                logger.warning("gmsh: %s", message)
-    finally:
-        gmsh.logger.stop()
-        gmsh.finalize()
+def _tagged(mesh: Mesh, names: Mapping[str, Group], groups: Mapping[Group, NDArray[np.int32]]) -> TaggedMesh:
+    """A mesh with groups, and tags made of them."""
+    tags = []
+    for dim in (mesh.topology.dim, mesh.topology.dim - 1):
+        index_map = mesh.topology.index_map(dim)
+        values = np.full(index_map.size_local + index_map.num_ghosts, _NONE, dtype=np.int32)
+        for (of, tag), entities in groups.items():
+            if of == dim:
+                values[entities] = tag
+        tagged = np.flatnonzero(values != _NONE).astype(np.int32)
+        tags.append(meshtags(mesh, dim, tagged, values[tagged]))
+    return TaggedMesh(mesh, tags[0], tags[1], names, groups)
 
 
 def _read(path: Path | str, comm: MPI.Comm, gdim: int, load: Callable[[], None]) -> TaggedMesh:
     """Load a gmsh model on rank 0 and distribute it."""
     if comm.bcast(gmsh.isInitialized()):
         raise ValueError(f"path = {path}: a gmsh session is already open, end it by gmsh.finalize() first")
-    names, problem = None, None
-    with _gmsh_session() if comm.rank == 0 else nullcontext():
-        if comm.rank == 0:
-            try:
+    model, problem = None, None
+    if comm.rank == 0:
+        try:
+            with gmsh_model.session():
                 load()
-                names = _group_names(gdim)
-            except Exception as error:  # gmsh raises nothing narrower
-                problem = str(error)
-        names, problem = comm.bcast((names, problem))
+                model = gmsh_model.extract(gdim)
+        except Exception as error:  # gmsh raises nothing narrower
+            problem = str(error) or type(error).__name__
+    problem = comm.bcast(problem)
+    try:
         if problem is not None:
-            raise ValueError(f"path = {path}: {problem}")
-        mesh, cell_tags, facet_tags = model_to_mesh(gmsh.model, comm, gdim)
-    return TaggedMesh(mesh, cell_tags, facet_tags, names)
+            raise ValueError(problem)
+        return _distributed(model, comm)
+    except ValueError as error:
+        raise ValueError(f"path = {path}: {error}") from None
 
 
-def _open(path: Path | str) -> None:
-    if not Path(path).is_file():
-        raise ValueError("no such file")
-    gmsh.open(str(path))
+def _distributed(model: gmsh_model.Model | None, comm: MPI.Comm) -> TaggedMesh:
+    """The mesh that rank 0 has, and its groups, on all ranks."""
+    shape = None if model is None else (model.cell, model.degree, model.points.shape[1], model.cells.shape[1])
+    cell, degree, gdim, nodes = comm.bcast(shape)
+    names, groups = comm.bcast(None if model is None else (model.names, model.groups))
+    element = basix.ufl.element("Lagrange", cell, degree, basix.LagrangeVariant.equispaced, shape=(gdim,))
+    cells = np.empty((0, nodes), dtype=np.int64) if model is None else model.cells
+    mesh = create_mesh(comm, cells, np.empty((0, gdim)) if model is None else model.points, element)
+    check_cells(mesh)
+    tdim, original = mesh.topology.dim, mesh.topology.original_cell_index
+    mesh.topology.create_entities(tdim - 1)
+    local = {
+        (dim, tag): np.flatnonzero(np.isin(original, rows)).astype(np.int32) if dim == tdim else _facets(mesh, rows)
+        for (dim, tag), rows in groups.items()
+    }
+    return _tagged(mesh, names, local)
 
 
-def _generate(path: Path | str, parameters: Mapping[str, float], gdim: int) -> None:
-    """Open a geometry, first as it is to learn what it declares, then with the parameters, and mesh it."""
-    _open(path)
-    if parameters:
-        known = {name for name in gmsh.onelab.getNames() if not name.startswith(("Gmsh/", "ONELAB/"))}
-        for name, value in parameters.items():
-            if name not in known:
-                raise ValueError(f"unknown parameter {name!r} (= {value}); known: {', '.join(sorted(known))}")
-            if not math.isfinite(value):
-                raise ValueError(f"parameter {name!r} = {value} must be finite")
-            gmsh.onelab.setNumber(name, [float(value)])
-        gmsh.parser.clear()
-        _open(path)
-    gmsh.model.mesh.generate(gdim)
-
-
-def _group_names(gdim: int) -> dict[str, tuple[int, int]]:
-    """Names of the groups of cells and facets, after a check that they make one mesh with unique tags."""
-    groups = gmsh.model.getPhysicalGroups()
-    top = max((dim for dim, _ in groups), default=None)
-    if top != gdim:
-        raise ValueError(f"gdim = {gdim}, but the highest dimension of a physical group is {top}")
-    names: dict[str, tuple[int, int]] = {}
-    tagged: set[tuple[int, int]] = set()
-    cell_types: set[int] = set()
-    for dim, tag in groups:
-        if dim < gdim - 1:
-            continue
-        name = gmsh.model.getPhysicalName(dim, tag)
-        if name in names:
-            raise ValueError(f"two physical groups are called {name!r}")
-        if name:
-            names[name] = (dim, tag)
-        for entity in gmsh.model.getEntitiesForPhysicalGroup(dim, tag):
-            if (dim, entity) in tagged:
-                raise ValueError(f"{name!r} (dimension {dim}, tag {tag}) overlaps another physical group")
-            tagged.add((dim, entity))
-            if dim == gdim:
-                cell_types.update(gmsh.model.mesh.getElementTypes(dim, entity))
-    if len(cell_types) != 1:
-        kinds = [gmsh.model.mesh.getElementProperties(kind)[0] for kind in sorted(cell_types)]
-        raise ValueError(f"the cells must be of one type, found {kinds or 'none'}")
-    return names
+def _facets(mesh: Mesh, corners: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Local facets with these corners, given in the numbers of the nodes as they were read."""
+    tdim = mesh.topology.dim
+    mesh.topology.create_connectivity(tdim - 1, tdim)
+    index_map = mesh.topology.index_map(tdim - 1)
+    facets = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    if not len(facets):  # entities_to_geometry of dolfinx 0.9 divides by their number
+        return facets
+    here = mesh.geometry.input_global_indices[entities_to_geometry(mesh, tdim - 1, facets)]
+    # rows are compared where all corners are among those wanted: few
+    near = np.isin(here, corners).all(axis=1)
+    return facets[near][gmsh_model.rows_in(np.sort(here[near], axis=1), np.sort(corners, axis=1))]

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from cutsim.base import kinematics
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.fields.cells import check_cells
 from cutsim.fields.measures import Measures
 
 
@@ -28,10 +29,12 @@ class State:
         measures: Integration measures that the terms share.
 
     Raises:
-        ValueError: The space is not one of vectors, or the mesh is no meridian plane.
+        ValueError: The space is not one of vectors, cells are folded or have no volume, or the mesh is no meridian
+            plane.
     """
 
     def __init__(self, V: fem.FunctionSpace, *, axisymmetric: bool = False) -> None:
+        check_cells(V.mesh)
         require("V", V.value_shape, V.value_shape == (V.mesh.geometry.dim,), "a vector space of the mesh's dimension")
         if axisymmetric:
             _check_meridian(V.mesh)
