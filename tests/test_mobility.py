@@ -1,4 +1,6 @@
-"""Bodies that nothing holds, loads that nothing carries, cracks that cannot open: refused by name."""
+"""Bodies that nothing holds or joins, loads that nothing carries, cracks that cannot open: refused by name."""
+
+import re
 
 import basix.ufl
 import numpy as np
@@ -6,6 +8,7 @@ import pytest
 from conftest import EXPONENTIAL, NU, E, make_blocks
 from dolfinx import fem, mesh
 from mpi4py import MPI
+from test_sliding import stack
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, StepError, run
@@ -121,6 +124,103 @@ def test_a_facet_has_one_law():
     one, two = b.crack(EXPONENTIAL, name="one"), b.crack(EXPONENTIAL, name="two")
     with pytest.raises(ValueError, match=r"'one' and 'two'.* without common facets, not 2"):
         Mechanics(b.state, [b.solid(), one, two], b.drive(b.lower, [0.0, 0.0]))
+
+
+@pytest.mark.mpi
+def test_more_ranks_than_cells():
+    """Two bodies of one cell each press on each other, on as many ranks as there are as on one."""
+    forces = []
+    for comm in (COMM, MPI.COMM_SELF):
+        s = stack(((0.0, 0.0), (1.0, 1.0), (1, 1)), ((0.0, 1.0), (1.0, 2.0), (1, 1)), comm=comm)
+        supports = [*s.drive(0, 0, [0.0, 0.0]), *s.drive(1, 1, [0.0, lambda t: -0.1 * t], "top")]
+        mechanics = Mechanics(s.state, [Solid(s.state, GEL), s.pair()], supports)
+        forces.append(run(mechanics, 1.0, StepControl.fixed(1.0)).columns["top_y_force"][0])
+    assert forces[0] == pytest.approx(forces[1], rel=1e-8) and forces[0] < -0.05
+
+
+def stacked(shift, held):
+    """Two squares above each other that have no node in common, the upper one shifted."""
+    s = stack(((0.0, 0.0), (1.0, 1.0), (2, 2)), ((shift, 1.0), (1.0 + shift, 2.0), (2, 2)))
+    pair = [s.pair()] if held == "pair" else []
+    upper = [0.0, lambda t: 0.1 * t] if held != "below" else []
+    supports = [*s.drive(0, 0, [0.0, 0.0]), *s.drive(1, 1, upper, "top")]
+    return s, Mechanics(s.state, [Solid(s.state, GEL, name="gel"), *pair], supports)
+
+
+@pytest.mark.mpi
+def test_bodies_that_were_not_merged_are_reported(caplog):
+    """Pulled apart they would just do so; a pair of surfaces between them, or another mesh, says that it is meant."""
+    told = r"3 pairs of nodes lie on each other between \(0, 1, 0\) and \(1, 1, 0\) .*: if .* merge them in gmsh"
+    stacked(0.0, "apart")
+    assert COMM.rank or re.search(told, caplog.text)
+    with pytest.raises(ValueError, match=r"can slide along x and y and turn: .* In the mesh " + told):
+        stacked(0.0, "below")[1].check()
+    caplog.clear()
+    stacked(0.0, "pair")
+    stacked(0.25, "apart")
+    assert not caplog.text
+
+
+@pytest.mark.mpi
+def test_a_mesh_that_is_split_along_the_crack_is_told_from_its_border():
+    s, _ = stacked(0.0, "apart")
+    with pytest.raises(ValueError, match=r"2 lie on the outer boundary, .*split along them, .*removeDuplicateNodes"):
+        cracked_space(s.state.mesh, ("Lagrange", 1, (2,)), s.face(0, 1, 1))
+    with pytest.raises(ValueError, match=r"allowed are interior facets$"):
+        cracked_space(s.state.mesh, ("Lagrange", 1, (2,)), s.face(0, 1, 0))
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("gdim", "missing"), [(2, (0.625,)), (3, (0.625, 0.375)), (3, (0.625, 0.125)), (2, (0.875,))])
+def test_a_gap_in_a_crack_is_warned_of(gdim, missing, caplog):
+    """A facet in the middle, in 3-D also at the border; a crack that ends before the border has none."""
+    domain, up = square(gdim).mesh, gdim - 1
+    facets = mesh.locate_entities(domain, up, side(up, 0.5))
+    middles = mesh.compute_midpoints(domain, up, facets)[:, :up]
+    kept = facets[~np.isclose(middles, missing).all(axis=1)]
+    state = State(cracked_space(domain, ("Lagrange", 1, (gdim,)), kept))
+    Crack(state, kept, (0.0, 0.0, 1.0)[-gdim:], None, young=E, name="cut")
+    place = ", ".join(f"{c:g}" for c in (*missing, 0.5, 0)[:3])
+    assert COMM.rank or (
+        f"cut: 1 single facets are missing in the middle of the crack, the first at ({place})" in caplog.text
+    ) == (missing != (0.875,))
+
+
+@pytest.mark.mpi
+def test_supports_agree_on_what_both_hold():
+    """At a corner held twice: equal values are one support, whose reaction counts once; others are refused."""
+    state = square()
+    bottom, left = (where(state, 1, side(axis, 0)) for axis in (1, 0))
+    top = where(state, 1, side(1, 1))
+
+    def mechanics(value, **options):
+        supports = [Support(state, bottom, 0), Support(state, bottom, 1), Support(state, left, 0, value, **options)]
+        return Mechanics(state, [Solid(state, GEL)], [*supports, Support(state, top, 1, lambda t: 0.1 * t, name="top")])
+
+    with pytest.raises(
+        ValueError, match=r"without a name and 'left' prescribe u_x = 0 and 0.1 .* on 1 nodes .* \(0, 0\)"
+    ):
+        mechanics(0.1, name="left")
+    later = mechanics(lambda t: 0.1 * t)
+    with pytest.raises(ValueError, match=r"u_x = 0 and 0.05 at time 0.5"):
+        run(later, 1.0, StepControl.fixed(0.5))
+    assert run(mechanics(lambda t: 1e-17 * t), 1.0, StepControl.fixed(1.0)).outcome.converged
+
+
+@pytest.mark.mpi
+def test_reactions_of_supports_sum_up_to_nothing():
+    """A block pressed on its left face between plates that do not slide, whose corners the face shares."""
+    state = square()
+    faces = {"left": (0, 0), "bottom": (1, 0), "top": (1, 1), "right": (0, 1)}
+    values = {"left": 0.0, "bottom": 0.0, "top": 0.0, "right": lambda t: -0.05 * t}
+    supports = [
+        Support(state, where(state, 1, side(*faces[name])), 0, values[name], name=name) for name in ("left", "right")
+    ]
+    held = [Support(state, where(state, 1, side(*faces[name])), 1, name=name) for name in ("bottom", "top")]
+    again = Support(state, where(state, 1, side(0, 0)), 0, name="again")
+    row = run(Mechanics(state, [Solid(state, GEL)], [*supports, *held, again]), 1.0, StepControl.fixed(1.0)).columns
+    assert row["again_force"][0] == 0.0
+    assert row["left_force"][0] == pytest.approx(-row["right_force"][0], rel=1e-6) and row["left_force"][0] > 0.01
 
 
 @pytest.mark.mpi

@@ -20,7 +20,7 @@ from cutsim.materials.library import SKIN, material
 from cutsim.materials.rubbers import MooneyRivlin, Ogden
 from cutsim.studies.layered import Layer, LayeredBlock, skin
 from cutsim.studies.layered_cut import LayeredCut
-from cutsim.tools.pointed import Blade
+from cutsim.tools.pointed import Blade, Needle
 
 HARD, SOFT = (Exponential.from_parameters(strength=t, toughness=G) for t, G in ((0.3, 0.06), (0.1, 0.02)))
 GLUE = Exponential.from_parameters(strength=1e3, opening=1e-4)
@@ -176,7 +176,7 @@ def test_one_law_makes_one_crack_and_a_notch_saves_its_toughness():
     assert columns["core_fracture"][0] == pytest.approx(0.2 * HARD.toughness[0], rel=5e-3)
 
 
-def sliced(comm, depth=0.5, toughness=(0.1, 0.04), width=None):
+def sliced(comm, depth=0.5, toughness=(0.1, 0.04), width=None, friction=0.0):
     """A blade through a stiff layer into a soft one, steps fixed: problem and history."""
     laws = [Exponential.from_parameters(opening=0.2, toughness=G) for G in toughness]
     layers = [
@@ -187,7 +187,8 @@ def sliced(comm, depth=0.5, toughness=(0.1, 0.04), width=None):
     domain = laminate(comm, thicknesses, length=1.0, size=0.1, band=0.3, notch=0.2, width=width, rows=1)
     block = LayeredBlock.build(layers, domain, damping=0.003)
     push, lateral = (axis[: domain.mesh.geometry.dim] for axis in ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0)))
-    cut, rows = LayeredCut.build(block, Blade(0.3, 0.1, 0.15, push, lateral), notch=0.2, drawn=0.1), []
+    blade, rows = Blade(0.3, 0.1, 0.15, push, lateral), []
+    cut = LayeredCut.build(block, blade, notch=0.2, drawn=0.1, friction=friction)
 
     def record(report):
         columns = report.columns | cut.columns(report.columns)
@@ -218,6 +219,24 @@ def test_a_cut_in_three_dimensions_is_that_of_the_plane():
     (_, plane), (_, solid) = (sliced(MPI.COMM_SELF, 0.25, (0.05, 0.05), width) for width in (None, 0.3))
     assert plane["force"][-1] > 1e-3
     np.testing.assert_allclose(solid["force"] / 0.3, plane["force"], atol=1e-6 * plane["force"].max())
+
+
+def test_friction_holds_the_blade_back():
+    """What friction costs is in its force, which the plate carries."""
+    (_, smooth), (_, rough) = (sliced(MPI.COMM_SELF, 0.25, friction=mu) for mu in (0.0, 0.2))
+    assert rough["force"][-1] > 1.05 * smooth["force"][-1]
+    assert rough["energy_friction"][-1] > 0 and "energy_friction" in smooth
+    assert np.all(rough["imbalance"] < 1e-6 * rough["force"].max())
+
+
+def test_tools_that_cut_no_layers_are_refused_by_name():
+    block = laminated(2, notch=0.2)
+    with pytest.raises(ValueError, match=r"blade = Needle\(.*: it must be a Blade"):
+        LayeredCut.build(block, Needle(0.3, 0.1, 0.15), notch=0.2)
+    with pytest.raises(ValueError, match=r"blade.push = \(0.0, -1.0, 0.0\) .* of 2 components"):
+        LayeredCut.build(block, Blade(0.3, 0.1, 0.15, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)), notch=0.2)
+    with pytest.raises(ValueError, match=r"friction = -0.1 is not allowed"):
+        LayeredCut.build(block, Blade(0.3, 0.1, 0.15), notch=0.2, friction=-0.1)
 
 
 def test_a_cut_needs_a_notch():

@@ -122,6 +122,11 @@ def test_refuses_what_cannot_touch():
         ToolContact(b.state, Ball(1.0), path, [], contact=CONTACT)
     with pytest.raises(ValueError, match=r"path = .* 2 components"):
         ToolContact(b.state, Ball(1.0), Path(lambda t: np.zeros(3)), [surface], contact=CONTACT)
+    with pytest.raises(ValueError, match=r"shape.push = \(0.0, -1.0, 0.0\) .* of 2 components"):
+        flat = Blade(0.3, 0.1, 0.2, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
+        ToolContact(b.state, flat, path, [surface], contact=CONTACT)
+    with pytest.raises(ValueError, match=r"lateral = \(1.0, 0.0\) .* of 3 components, as push has"):
+        Blade(0.3, 0.1, 0.2, (0.0, -1.0, 0.0))
     with pytest.raises(ValueError, match="mu = -1 is not allowed"):
         SmoothCoulomb(-1, 0.1)
     with pytest.raises(ValueError, match="slip = 0 is not allowed"):

@@ -16,15 +16,20 @@ from cutsim.analysis.mobility import extent, free_motion
 from cutsim.base.assembly import global_dot
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.base.log import collective_logger
 from cutsim.base.terms import Term
+from cutsim.bodies.constraints import Constraints
 from cutsim.bodies.inertia import Inertia
 from cutsim.bodies.loads import Load, Support
 from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
+from cutsim.fields.twins import unjoined
 from cutsim.interface.crack import Crack
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.solvers.newton import NonlinearProblem, Outcome
+
+logger = collective_logger(__name__)
 
 # displacement over the size of the mesh at which a solve is given up
 _RUNAWAY = 100.0
@@ -54,8 +59,8 @@ class Mechanics:
         inertia: Velocity, acceleration and momentum; None if quasi-static.
 
     Raises:
-        ValueError: There is no term, two terms or supports share a name, or a dynamic analysis has no solid or one
-            without density.
+        ValueError: There is no term, two terms or supports share a name, two supports prescribe different displacements
+            of one node, or a dynamic analysis has no solid or one without density.
     """
 
     def __init__(
@@ -79,6 +84,7 @@ class Mechanics:
         solids = [t for t in terms if isinstance(t, Solid)]
         self.inertia = Inertia(state, solids, scheme, mass) if analysis == "dynamic" else None
         self.terms: tuple[Term, ...] = self._static if self.inertia is None else (*terms, self.inertia)
+        self._constraints = Constraints(state, supports)
         self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
         _check_one_law(state, [t for t in terms if isinstance(t, Crack)])
         v = ufl.TestFunction(state.V)
@@ -99,6 +105,10 @@ class Mechanics:
             largest=_RUNAWAY * extent(state.mesh.comm, state.mesh.geometry.x),
         )
         self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
+        pairs = [facets for t in terms if isinstance(t, SurfacePair) for facets in t.facets]
+        self._apart = unjoined(state.mesh, np.concatenate([np.empty(0, dtype=np.int32), *pairs]))
+        if self._apart:
+            logger.warning("mesh: %s", self._apart)
         self._begun = False
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
         self._residual_old: NDArray[np.float64] = self._residual
@@ -127,6 +137,7 @@ class Mechanics:
             raise ValueError(
                 f"{motion}: neither a support nor a bond nor a closed contact holds it. Add a Support, let the "
                 "surfaces overlap a little where a contact is to hold it, or use analysis='dynamic'"
+                + (f". In the mesh {self._apart}" if self._apart else "")
             )
 
     def begin(self, time: float) -> None:
@@ -142,6 +153,7 @@ class Mechanics:
         self.state.begin(time)
         for part in self._parts:
             part.begin(time)
+        self._constraints.check()
         if self.inertia is not None:
             self.problem.known[:] = self.inertia.history(self._residual_old)
 
@@ -229,7 +241,7 @@ class Mechanics:
 
     def reaction(self, support: Support) -> float:
         """Reaction of a support along its component in the trial state [force]. Collective."""
-        return support.reaction(self._residual)
+        return self._constraints.reaction(support, self._residual)
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity). Collective."""

@@ -1,5 +1,6 @@
 """One way to refuse bad input: the parameter, its value and what is allowed."""
 
+from collections.abc import Iterable
 from typing import Any
 
 
@@ -17,3 +18,8 @@ def require(name: str, value: Any, valid: bool, allowed: str) -> None:
     """
     if not valid:
         raise ValueError(f"{name} = {value!r} is not allowed: it must be {allowed}")
+
+
+def place(x: Iterable[float]) -> str:
+    """A position in words."""
+    return "({})".format(", ".join(f"{round(float(c), 12) + 0.0:.4g}" for c in x))

@@ -20,7 +20,8 @@ from cutsim.fields.state import State
 class Support:
     """Prescribed displacement of one component on some facets (or vertices), with its reaction.
 
-    On a crack it holds all its sides.
+    On a crack it holds all its sides. Several supports may hold the same node along the same component if they agree on
+    its displacement at all times; its reaction then counts for the first of them that has a name.
 
     Args:
         state: Displacement and time.
@@ -73,14 +74,6 @@ class Support:
     def rates(self, start: float, end: float) -> tuple[float, float]:
         """Prescribed velocity and acceleration at the start of a span of time without a corner."""
         return self._value.rates(start, end)
-
-    def reaction(self, residual: NDArray[np.float64]) -> float:
-        """Force of the support on the body along its component [force]. Collective.
-
-        Args:
-            residual: Owned entries of internal minus external nodal forces.
-        """
-        return float(self.state.mesh.comm.allreduce(float(residual[self.dofs].sum())))
 
 
 class Load(Term, ABC):

@@ -5,6 +5,7 @@ from dolfinx.mesh import Mesh, compute_midpoints, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.checks import place
 from cutsim.base.compat import geometry_nodes
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ def _refuse(comm: MPI.Comm, places: Array, what: str) -> None:
     count = sum(n for n, _ in told)
     if count:
         first = next(p[0] for n, p in told if n)
-        raise ValueError(f"mesh: {count} {what}, the first at ({', '.join(f'{c:.4g}' for c in first)})")
+        raise ValueError(f"mesh: {count} {what}, the first at {place(first)}")
 
 
 def _volumes(mesh: Mesh, x: Array) -> Array:

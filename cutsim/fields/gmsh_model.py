@@ -14,6 +14,8 @@ from dolfinx import cpp
 from dolfinx.mesh import CellType
 from numpy.typing import NDArray
 
+from cutsim.base.checks import place
+
 logger = logging.getLogger(__name__)
 
 #: Endings of the formats in which gmsh reads the names of groups; of others it reads none, or nothing at all.
@@ -150,11 +152,6 @@ def rows_in(rows: NDArray[np.integer], among: NDArray[np.integer]) -> NDArray[np
     both = np.concatenate([among.reshape(-1, rows.shape[1]), rows])
     number = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     return np.isin(number[len(among) :], number[: len(among)])
-
-
-def place(x: Floats) -> str:
-    """A position in words."""
-    return "({})".format(", ".join(f"{c:.4g}" for c in x))
 
 
 def _check_file(path: Path | str) -> None:

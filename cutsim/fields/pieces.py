@@ -2,9 +2,14 @@
 
 import numpy as np
 from dolfinx import fem, la
+from dolfinx.common import IndexMap
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+
+from cutsim.base.compat import geometry_nodes
 
 
 def connected_pieces(V: fem.FunctionSpace) -> tuple[int, NDArray[np.int32]]:
@@ -16,7 +21,16 @@ def connected_pieces(V: fem.FunctionSpace) -> tuple[int, NDArray[np.int32]]:
     Returns:
         The number of pieces, the same on all ranks, and the piece of each local (blocked) dof, ghosts included.
     """
-    comm, index_map, cells = V.mesh.comm, V.dofmap.index_map, V.dofmap.list
+    return _pieces(V.mesh.comm, V.dofmap.index_map, V.dofmap.list)
+
+
+def mesh_pieces(mesh: Mesh) -> tuple[int, NDArray[np.int32]]:
+    """Pieces of a mesh whose cells hang together by shared nodes, and the piece of each local node. Collective."""
+    return _pieces(mesh.comm, mesh.geometry.index_map(), geometry_nodes(mesh))
+
+
+def _pieces(comm: MPI.Comm, index_map: IndexMap, cells: NDArray[np.int32]) -> tuple[int, NDArray[np.int32]]:
+    """Pieces of the indices of cells, a row of them for each local cell."""
     dofs = index_map.size_local + index_map.num_ghosts
     # every dof of a cell hangs together with its first one
     first = np.repeat(cells[:, :1], cells.shape[1], axis=1)

@@ -11,6 +11,14 @@ from numpy.typing import NDArray
 from cutsim.base.compat import geometry_nodes
 
 
+def incidence(mesh: Mesh, dim: int, sub: int) -> NDArray[np.int32]:
+    """Entities of a lower dimension on each local entity, shape (entities, number on each); all are of one type."""
+    mesh.topology.create_connectivity(dim, sub)
+    table = mesh.topology.connectivity(dim, sub)
+    # a rank may have none at all
+    return table.array.reshape(table.num_nodes, int(table.offsets[1]) if table.num_nodes else 1)
+
+
 def facet_size(mesh: Mesh, facets: NDArray[np.int32]) -> NDArray[np.float64]:
     """Shortest edge of each of the given local facets: the mesh size for a front that crosses them. Collective."""
     return _shortest_edge(mesh, mesh.topology.dim - 1, facets)
@@ -48,11 +56,9 @@ def _shortest_edge(mesh: Mesh, dim: int, entities: NDArray[np.int32]) -> NDArray
     topology = mesh.topology
     topology.create_entities(1)
     topology.create_connectivity(1, topology.dim)
-    topology.create_connectivity(dim, 1)
     if dim == 1:
         return mesh.h(1, entities)
-    edges = topology.connectivity(dim, 1)
-    per_entity = edges.array.reshape(edges.num_nodes, -1)[entities]
+    per_entity = incidence(mesh, dim, 1)[entities]
     return mesh.h(1, per_entity.ravel()).reshape(per_entity.shape).min(axis=1)
 
 

@@ -20,10 +20,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from cutsim.base import compat
+from cutsim.fields.sizes import incidence
+from cutsim.fields.twins import MERGE, split_along
 
 Facets = NDArray[np.int32] | Sequence[NDArray[np.int32]]
 
-_CRACKED = "cracked_facets"  # attribute of a cracked space: which local facets, ghosts included, it is cracked along
+#: Attribute of a cracked space: which local facets, ghosts included, it is cracked along.
+CRACKED = "cracked_facets"
 _TANGENT = 1e-3  # |n·e| below which the side of a facet cannot be told from the direction e
 
 
@@ -61,32 +64,8 @@ def cracked_space(mesh: Mesh, element: Any, facets: Facets) -> fem.FunctionSpace
     incidence = _incidence(mesh, parent, cracked)
     dofs, owners = _split_dofs(parent, incidence, _copies(mesh.comm, incidence))
     space = _with_dofs(parent, dofs, owners)
-    vars(space)[_CRACKED] = cracked
+    vars(space)[CRACKED] = cracked
     return space
-
-
-def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) -> None:
-    """Refuse a crack on facets along which the space holds together: it could not open. Collective.
-
-    Args:
-        V: The space.
-        facets: Local facets of the crack.
-        name: Name of the crack.
-
-    Raises:
-        ValueError: On all ranks, with the number of these facets and the place of one.
-    """
-    comm, facets = V.mesh.comm, np.asarray(facets, dtype=np.int32)
-    cracked = vars(V).get(_CRACKED)
-    whole = facets if cracked is None else facets[~cracked[facets]]
-    problem = None
-    if len(whole):
-        place = ", ".join(f"{c:.4g}" for c in compute_midpoints(V.mesh, V.mesh.topology.dim - 1, whole[:1])[0])
-        problem = (
-            f"facets of {name!r}: the space is not cracked along {len(whole)} of {len(facets)} of them (on one rank), "
-            f"one of which is at ({place}); they must be among the facets that were given to cracked_space"
-        )
-    _refuse(comm, problem)
 
 
 def vertex_space(V: fem.FunctionSpace, cells: NDArray[np.int32] | None = None) -> fem.FunctionSpace:
@@ -109,7 +88,7 @@ def vertex_space(V: fem.FunctionSpace, cells: NDArray[np.int32] | None = None) -
     body = cell_dofs[owned if cells is None else np.intersect1d(cells, owned)]
     used = np.zeros(n + index_map.num_ghosts, dtype=np.int32)
     used[body] = 1
-    kept = np.flatnonzero(_sum_over_ranks(index_map, used)[:n])
+    kept = np.flatnonzero(sum_over_ranks(index_map, used)[:n])
     counts = comm.allgather(kept.size)
     number = la.vector(index_map, dtype=np.int64)
     number.array[:] = -1
@@ -171,27 +150,25 @@ def locate_dofs(V: fem.FunctionSpace, dim: int, entities: NDArray[np.int32]) -> 
     """
     topology, dofmap = V.mesh.topology, V.dofmap
     topology.create_entities(dim)
-    topology.create_connectivity(topology.dim, dim)
-    table = topology.connectivity(topology.dim, dim)
-    cell_entities = table.array.reshape(table.num_nodes, -1)
+    cell_entities = incidence(V.mesh, topology.dim, dim)
     named = _marks(V.mesh.comm, topology.index_map(dim), np.asarray(entities, dtype=np.int32), "entities")
     cells, local = np.nonzero(named[cell_entities])
     closure = np.array([dofmap.dof_layout.entity_closure_dofs(dim, i) for i in range(cell_entities.shape[1])])
     found = np.zeros(dofmap.index_map.size_local + dofmap.index_map.num_ghosts, dtype=np.int32)
     found[dofmap.list[cells[:, None], closure[local]]] = 1
-    return np.flatnonzero(_sum_over_ranks(dofmap.index_map, found)).astype(np.int32)
+    return np.flatnonzero(sum_over_ranks(dofmap.index_map, found)).astype(np.int32)
 
 
 # --- the crack in the mesh ---
 
 
-def _refuse(comm: MPI.Comm, message: str | None) -> None:
+def refuse(comm: MPI.Comm, message: str | None) -> None:
     """Raise the message of the lowest rank that has one, on all ranks."""
     if told := [m for m in comm.allgather(message) if m]:
         raise ValueError(told[0])
 
 
-def _sum_over_ranks(index_map: IndexMap, values: NDArray[Any]) -> NDArray[np.int32]:
+def sum_over_ranks(index_map: IndexMap, values: NDArray[Any]) -> NDArray[np.int32]:
     """Sum of the values that the ranks hold for each index, returned to all of them."""
     total = la.vector(index_map, dtype=np.int32)
     total.array[:] = values
@@ -209,9 +186,7 @@ def _cell_facets(mesh: Mesh) -> NDArray[np.int32]:
     """Facets of every local cell, shape (cells, facets of a cell)."""
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)  # for the midpoints and normals of facets
-    mesh.topology.create_connectivity(tdim, tdim - 1)
-    table = mesh.topology.connectivity(tdim, tdim - 1)
-    return table.array.reshape(table.num_nodes, -1)
+    return incidence(mesh, tdim, tdim - 1)
 
 
 def _marks(comm: MPI.Comm, index_map: IndexMap, indices: NDArray[np.int32], name: str) -> NDArray[np.bool_]:
@@ -219,10 +194,10 @@ def _marks(comm: MPI.Comm, index_map: IndexMap, indices: NDArray[np.int32], name
     size = index_map.size_local + index_map.num_ghosts
     bad = indices[(indices < 0) | (indices >= size)]
     text = f"{name}: {bad.size} indices out of range, e.g. {bad[:1]}; allowed are 0 to {size - 1}"
-    _refuse(comm, text if bad.size else None)
+    refuse(comm, text if bad.size else None)
     named = np.zeros(size, dtype=np.int32)
     named[indices] = 1
-    return _sum_over_ranks(index_map, named) > 0
+    return sum_over_ranks(index_map, named) > 0
 
 
 def _crack_marks(mesh: Mesh, facets: Facets) -> NDArray[np.bool_]:
@@ -237,7 +212,7 @@ def _crack_marks(mesh: Mesh, facets: Facets) -> NDArray[np.bool_]:
     cell_facets = _cell_facets(mesh)
     owned = cell_facets[: mesh.topology.index_map(mesh.topology.dim).size_local]
     cells_here = np.bincount(cell_facets.ravel(), minlength=cracked.size)
-    cells_everywhere = _sum_over_ranks(index_map, np.bincount(owned.ravel(), minlength=cracked.size))
+    cells_everywhere = sum_over_ranks(index_map, np.bincount(owned.ravel(), minlength=cracked.size))
     hidden = int(np.sum(cells_here[np.unique(owned)] < cells_everywhere[np.unique(owned)]))
     if total := comm.allreduce(hidden):
         raise ValueError(
@@ -246,6 +221,8 @@ def _crack_marks(mesh: Mesh, facets: Facets) -> NDArray[np.bool_]:
         )
     outer = np.flatnonzero(cracked & (cells_everywhere == 1)).astype(np.int32)
     text = "facets: {} lie on the outer boundary, e.g. at {}; allowed are interior facets"
+    if comm.allreduce(len(outer)) and split_along(mesh, outer):
+        text += f". The mesh is split along them, their nodes are there twice: cracks are opened here, {MERGE}"
     _refuse_facets(mesh, outer, text)
     return cracked
 
@@ -254,7 +231,7 @@ def _refuse_facets(mesh: Mesh, bad: NDArray[np.int32], text: str) -> None:
     """Refuse the facets, if any, with their number over all ranks and the midpoint of one of them."""
     count = mesh.comm.allreduce(int(np.sum(bad < _facet_map(mesh).size_local)))
     where = compute_midpoints(mesh, mesh.topology.dim - 1, bad[:1]).reshape(-1, 3).round(6).tolist()
-    _refuse(mesh.comm, text.format(count, where[0]) if bad.size else None)
+    refuse(mesh.comm, text.format(count, where[0]) if bad.size else None)
 
 
 # --- the sides of the crack ---
@@ -283,7 +260,7 @@ def _along(mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], direction: NDA
     tdim, gdim, facets = mesh.topology.dim, mesh.geometry.dim, facets.astype(np.int32)
     sound = direction.shape == (gdim,) and np.all(np.isfinite(direction)) and np.any(direction)
     message = f"plus: {direction} is no direction; allowed are {gdim} finite floats, not all zero"
-    _refuse(mesh.comm, None if sound else message)
+    refuse(mesh.comm, None if sound else message)
     normals = cpp.mesh.cell_normals(mesh._cpp_object, tdim - 1, facets).reshape(-1, 3)
     first = np.ascontiguousarray(cells[:, 0], dtype=np.int32)
     outward = compute_midpoints(mesh, tdim - 1, facets) - compute_midpoints(mesh, tdim, first)
@@ -331,7 +308,7 @@ def _incidence(mesh: Mesh, parent: fem.FunctionSpace, cracked: NDArray[np.bool_]
     cells, local = np.nonzero(cracked[cell_facets])
     on_crack = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     on_crack[cell_dofs[cells[:, None], closure[local]]] = 1
-    marked = _sum_over_ranks(index_map, on_crack) > 0
+    marked = sum_over_ranks(index_map, on_crack) > 0
 
     cell_map = mesh.topology.index_map(tdim)
     dof_number = index_map.local_to_global(np.arange(marked.size, dtype=np.int32))

@@ -5,6 +5,7 @@ jump is δ = u⁻ − u⁺, the normal n points from '+' to '−', and the tract
 face: T·n > 0 pulls them together.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,9 +21,10 @@ from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_n
 from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
 from cutsim.base.terms import Term
+from cutsim.fields.crack_checks import check_cracked
 from cutsim.fields.points import FacetPoints, Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
-from cutsim.fields.space import check_cracked, crack_measure_entities
+from cutsim.fields.space import crack_measure_entities
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw, process_zone_element
 from cutsim.interface.contact import PenaltyContact
@@ -30,6 +32,9 @@ from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.law import Response, respond
 
 logger = collective_logger(__name__)
+
+# pressure over that of faces which look at each other that counts as none
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -201,16 +206,20 @@ class Crack(Term):
     def diagnose(self) -> str | None:
         """Say where the trial state of the last solve opens or closes most. Collective."""
         values = self._evaluate_at(1.0)
-        opening, penetration = self.points.maximum(values["opening"]), self.points.maximum(-values["opening"])
-        return f"{self.name}: largest opening {opening:.3g}, largest penetration {max(penetration, 0.0):.3g}"
+        opening, penetration = self.points.maximum(values["opening"]), self._penetration(values)
+        return f"{self.name}: largest opening {opening:.3g}, largest penetration {penetration:.3g}"
+
+    def _penetration(self, values: Mapping[str, Values]) -> float:
+        """Largest penetration of a point that is pressed, as faces that turn away are not. Collective."""
+        depth = -values["opening"]
+        pressed = values["pressure"] > _ROUNDING * self.contact.stiffness * np.abs(depth)
+        return max(self.points.maximum(np.where(pressed, depth, 0.0)), 0.0)
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
-        trial = self.history.trial
-        penetration = max(self.points.maximum(np.where(trial["pressure"] > 0, -trial["opening"], 0.0)), 0.0)
         columns = {
             f"{self.name}_opening": (self.points.maximum(self.history.trial["opening"]), "length"),
-            f"{self.name}_penetration": (penetration / self.normal_size, "one"),
+            f"{self.name}_penetration": (self._penetration(self.history.trial) / self.normal_size, "one"),
         }
         if self.law is not None:
             kind = self.state.facet_measure

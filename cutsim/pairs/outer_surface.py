@@ -10,6 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.fields.sizes import incidence
 from cutsim.pairs.pairing import Array, Indices, Shape
 
 
@@ -130,10 +131,9 @@ def _cells_of(mesh: Mesh, facets: NDArray[np.int32]) -> tuple[NDArray[np.int32],
     """The cell of each exterior facet, and its number therein."""
     tdim = mesh.topology.dim
     mesh.topology.create_connectivity(tdim - 1, tdim)
-    mesh.topology.create_connectivity(tdim, tdim - 1)
-    to_cells, to_facets = mesh.topology.connectivity(tdim - 1, tdim), mesh.topology.connectivity(tdim, tdim - 1)
+    to_cells = mesh.topology.connectivity(tdim - 1, tdim)
     cells = to_cells.array[to_cells.offsets[facets]]
-    per_cell = to_facets.array.reshape(to_facets.num_nodes, -1)[cells]
+    per_cell = incidence(mesh, tdim, tdim - 1)[cells]
     return cells, np.argmax(per_cell == np.asarray(facets)[:, None], axis=1).astype(np.int32)
 
 

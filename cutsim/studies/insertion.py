@@ -144,7 +144,7 @@ class Insertion:
             ValueError: A parameter is outside its range or the mesh lacks a group.
         """
         tip = TIP_IN_NOTCH * notch
-        _check_tool(tool, notch, domain.mesh.geometry.dim)
+        check_tool("tool", tool, notch, domain.mesh.geometry.dim)
         require("friction", friction, friction >= 0, ">= 0")
         require("insertion", insertion, insertion > 0, "> 0")
         require("turn", turn, turn is None or turn > tip, f"> {tip}, where the push begins, or None")
@@ -281,13 +281,23 @@ def check_block(domain: TaggedMesh, notch: float) -> float:
     return height
 
 
-def _check_tool(tool: Blade | Needle, notch: float, gdim: int) -> None:
-    """Refuse a tool that does not fit the notch or the direction of the push."""
-    require("notch", notch, notch > tool.tip_radius, f"> the tool's tip radius {tool.tip_radius}")
-    require("tool.side", tool.side, tool.side == 0, "0, the whole tool")
+def check_tool(name: str, tool: Blade | Needle, notch: float, gdim: int) -> None:
+    """Refuse a tool that does not fit the notch or the direction of the push.
+
+    Args:
+        name: Name of the parameter as the user wrote it.
+        tool: The tool.
+        notch: Depth of the notch [length].
+        gdim: Dimension of the mesh.
+
+    Raises:
+        ValueError: It is too blunt for the notch, halved, points elsewhere or has the components of another dimension.
+    """
+    require("notch", notch, notch > tool.tip_radius, f"> the tip radius {tool.tip_radius} of the {name}")
+    require(f"{name}.side", tool.side, tool.side == 0, "0, the whole tool")
     down = len(tool.push) == gdim and tool.push[1] == -1
-    require("tool.push", tool.push, down, f"along −y, of {gdim} components")
-    require("tool.half_angle", tool.half_angle, tool.half_angle <= _WIDEST, "at most π/3: it is in radians")
+    require(f"{name}.push", tool.push, down, f"along −y, of {gdim} components")
+    require(f"{name}.half_angle", tool.half_angle, tool.half_angle <= _WIDEST, "at most π/3: it is in radians")
 
 
 def soft_contact(tool: Blade | Needle, crack: Crack, young: float) -> PenaltyContact:

@@ -8,8 +8,9 @@ from cutsim.base.checks import require
 from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.interface.crack import Crack
+from cutsim.interface.friction import Coulomb
 from cutsim.results.recording import Columns
-from cutsim.studies.insertion import FACES, TIP_IN_NOTCH, check_block, soft_contact, tool_path
+from cutsim.studies.insertion import FACES, TIP_IN_NOTCH, check_block, check_tool, soft_contact, tool_path
 from cutsim.studies.layered import LayeredBlock
 from cutsim.tools.pointed import Blade
 from cutsim.tools.tool_contact import ToolContact, warn_coarse
@@ -44,7 +45,14 @@ class LayeredCut:
 
     @classmethod
     def build(
-        cls, block: LayeredBlock, blade: Blade, *, notch: float, drawn: float = 0.0, insertion: float = 1.0
+        cls,
+        block: LayeredBlock,
+        blade: Blade,
+        *,
+        notch: float,
+        friction: float = 0.0,
+        drawn: float = 0.0,
+        insertion: float = 1.0,
     ) -> Self:
         """Put the problem together and compile its forms. Collective.
 
@@ -52,13 +60,16 @@ class LayeredCut:
             block: The layers, with a notch.
             blade: The whole blade (side 0).
             notch: Depth of the notch [length].
+            friction: Friction coefficient of blade and block [–].
             drawn: Way by which each far end is drawn outwards during the insertion [length].
             insertion: Duration of the insertion [time].
 
         Raises:
             ValueError: A parameter is outside its range, or the block has no notch.
         """
-        require("notch", notch, notch > blade.tip_radius, f"> the blade's tip radius {blade.tip_radius}")
+        require("blade", blade, isinstance(blade, Blade), "a Blade: a needle makes no planar crack in layers")
+        check_tool("blade", blade, notch, block.domain.mesh.geometry.dim)
+        require("friction", friction, friction >= 0, ">= 0")
         require("drawn", drawn, drawn >= 0, ">= 0")
         require("insertion", insertion, insertion > 0, "> 0")
         mouth, tip = block.notch, TIP_IN_NOTCH * notch
@@ -67,7 +78,10 @@ class LayeredCut:
         check_block(block.domain, notch)
         for crack in block.cracks:
             warn_coarse(crack.name, blade, crack.size)
-        contacts = tuple(_half(block, blade, crack, tip, insertion, face) for face in FACES for crack in block.cracks)
+        rubs = Coulomb(friction) if friction else None
+        contacts = tuple(
+            _half(block, blade, crack, tip, insertion, rubs, face) for face in FACES for crack in block.cracks
+        )
         plate = Support(block.state, block.domain.facets("bottom"), 1, name="plate")
         ends = [_end(block, f"far_{name}", side * drawn, insertion) for _, side, name in FACES]
         sides = [name for name in ("front", "back") if name in block.domain.names]
@@ -93,7 +107,13 @@ class LayeredCut:
 
 
 def _half(
-    block: LayeredBlock, blade: Blade, crack: Crack, tip: float, insertion: float, face: tuple[Side, int, str]
+    block: LayeredBlock,
+    blade: Blade,
+    crack: Crack,
+    tip: float,
+    insertion: float,
+    friction: Coulomb | None,
+    face: tuple[Side, int, str],
 ) -> ToolContact:
     """Half of the blade on its face of a part of the crack; on that of the notch and the top beside the first part."""
     mark, side, name = face
@@ -106,6 +126,7 @@ def _half(
         tool_path(blade, side, (tip, insertion, None), block.state.mesh.geometry.dim),
         surfaces,
         contact=soft_contact(blade, crack, min(layer.material.young for layer in block.layers_of(crack))),
+        friction=friction,
         name=f"blade_{name}_{crack.name}",
     )
 

@@ -108,6 +108,8 @@ class Pointed(ABC):
         require("lateral", self.lateral, self.side == 0 or self.lateral is not None, "a direction, to halve the tool")
         if self.lateral is not None:
             object.__setattr__(self, "lateral", unit("lateral", self.lateral))
+            alike = len(self.lateral) == len(self.push)
+            require("lateral", self.lateral, alike, f"of {len(self.push)} components, as push has")
             inner = float(np.dot(self.push, self.lateral))
             require("lateral", self.lateral, abs(inner) < 1e-12, "orthogonal to push")
 

@@ -39,6 +39,17 @@ def unit(name: str, vector: Direction) -> Direction:
     return tuple(float(v) / norm for v in vector)
 
 
+def check_directions(shape: Shape, gdim: int) -> None:
+    """Refuse a shape with directions of another dimension than the mesh.
+
+    Raises:
+        ValueError: A direction has not as many components as the mesh.
+    """
+    for name, value in vars(shape).items():
+        if isinstance(value, tuple):
+            require(f"shape.{name}", value, len(value) == gdim, f"of {gdim} components, as the mesh has")
+
+
 def along(x: Expr, direction: Direction) -> Expr:
     """Component along a unit vector."""
     return ufl.dot(x, ufl.as_vector(direction))

@@ -19,7 +19,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
 from cutsim.tools.rigid_tool import RigidTool
-from cutsim.tools.shapes import Path, Shape
+from cutsim.tools.shapes import Path, Shape, check_directions
 
 logger = collective_logger(__name__)
 
@@ -131,6 +131,7 @@ class ToolContact(RigidTool):
     ) -> None:
         super().__init__(state, path, name)
         require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
+        check_directions(shape, state.mesh.geometry.dim)
         self.shape, self.contact, self.friction = shape, contact, friction
         self.symmetric = friction is None
         law = None if friction is None else completed(friction, contact.stiffness)

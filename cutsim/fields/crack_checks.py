@@ -1,0 +1,72 @@
+"""Whether the facets of a crack are a crack: opened in the space, and without a gap."""
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import Mesh, compute_midpoints, exterior_facet_indices
+from numpy.typing import NDArray
+
+from cutsim.base.checks import place
+from cutsim.base.log import collective_logger
+from cutsim.fields.sizes import incidence
+from cutsim.fields.space import CRACKED, refuse, sum_over_ranks
+
+logger = collective_logger(__name__)
+
+
+def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) -> None:
+    """Refuse a crack on facets along which the space holds together: it could not open. Collective.
+
+    A single facet that is missing in the middle of the cracks, and holds them together, is warned of.
+
+    Args:
+        V: The space.
+        facets: Local facets of the crack.
+        name: Name of the crack.
+
+    Raises:
+        ValueError: On all ranks, with the number of these facets and the place of one.
+    """
+    facets = np.asarray(facets, dtype=np.int32)
+    cracked = vars(V).get(CRACKED)
+    whole = facets if cracked is None else facets[~cracked[facets]]
+    problem = None
+    if len(whole):
+        problem = (
+            f"facets of {name!r}: the space is not cracked along {len(whole)} of {len(facets)} of them (on one rank), "
+            f"one of which is at {_place(V.mesh, whole[:1])}; they must be among the facets that were given to "
+            "cracked_space"
+        )
+    refuse(V.mesh.comm, problem)
+    if cracked is not None:
+        _warn_gaps(V.mesh, cracked, facets, name)
+
+
+def _warn_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32], name: str) -> None:
+    """Warn of facets that hold a crack together in its middle: it goes on beyond each of their ridges."""
+    fdim = mesh.topology.dim - 1
+    mesh.topology.create_entities(fdim - 1)
+    ridges, ridge_map = incidence(mesh, fdim, fdim - 1), mesh.topology.index_map(fdim - 1)
+    owned, count = mesh.topology.index_map(fdim).size_local, ridge_map.size_local + ridge_map.num_ghosts
+
+    def per_ridge(some: NDArray[np.integer]) -> NDArray[np.int32]:
+        here = ridges[some[some < owned]].ravel()
+        return sum_over_ranks(ridge_map, np.bincount(here, minlength=count))
+
+    outer = exterior_facet_indices(mesh.topology)
+    outside, ends = per_ridge(outer) > 0, per_ridge(np.flatnonzero(cracked)) == 1
+    own = per_ridge(facets) > 0
+    front = ends[ridges[:owned]]
+    gap = ~cracked[:owned] & (front | outside[ridges[:owned]]).all(axis=1)
+    gap &= (front & own[ridges[:owned]]).sum(axis=1) >= 2
+    gap[outer[outer < owned]] = False
+    found = np.flatnonzero(gap).astype(np.int32)
+    places = [p for p in mesh.comm.allgather([_place(mesh, found[i : i + 1]) for i in range(len(found))]) for p in p]
+    if places:
+        logger.warning(
+            "%s: %d single facets are missing in the middle of the crack, the first at %s; they hold it together",
+            name, len(places), places[0],
+        )  # fmt: skip
+
+
+def _place(mesh: Mesh, facet: NDArray[np.int32]) -> str:
+    return place(compute_midpoints(mesh, mesh.topology.dim - 1, facet)[0])
