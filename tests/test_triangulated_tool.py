@@ -301,7 +301,7 @@ def test_refusal_of_a_file(tmp_path):
 
 @pytest.mark.mpi
 def test_refusal_of_a_tool():
-    for options, name in (({"search": 0.0}, "search"), ({"path": drawn(3, 0.1)}, "path")):
+    for options, name in (({"search": 0.0}, "search"), ({"path": drawn(3, 0.1)}, r"path\(0\)")):
         with pytest.raises(ValueError, match=f"{name} = "):
             indented(2, ball(2, 1), **{"path": drawn(2, 0.1), "n": 2, **options})
     with pytest.raises(ValueError, match=r"surface = .* 2 components"):

@@ -17,6 +17,7 @@ from cutsim.base.assembly import global_dot
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.log import collective_logger
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.bodies.constraints import Constraints
 from cutsim.bodies.inertia import Inertia
@@ -63,6 +64,7 @@ class Mechanics:
             of one node, or a dynamic analysis has no solid or one without density.
     """
 
+    @checked
     def __init__(
         self,
         state: State,

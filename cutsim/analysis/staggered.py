@@ -9,8 +9,9 @@ from mpi4py import MPI
 
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.heat.transfer import HeatTransfer
 from cutsim.solvers.newton import Outcome
@@ -34,9 +35,10 @@ class ThermoMechanics:
         ValueError: The problems have different states, or `iterate` is not positive.
     """
 
+    @checked
     def __init__(self, mechanics: Mechanics, heat: HeatTransfer, *, iterate: float | None = None) -> None:
         require("heat", heat.state, heat.state is mechanics.state, "a problem on the state of the mechanics")
-        require("iterate", iterate, iterate is None or iterate > 0, "> 0 or None")
+        require_number("iterate", iterate, positive.or_none)
         self.mechanics, self.heat, self.iterate = mechanics, heat, iterate
         self.state = mechanics.state
 

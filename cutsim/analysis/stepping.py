@@ -8,18 +8,19 @@ import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from math import inf, isfinite
+from math import isfinite
 from types import FrameType
 from typing import Protocol
 
 from mpi4py import MPI
 
-from cutsim.base.checks import require
+from cutsim.base.checks import above, at_least, between, count, positive, require, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.log import collective_logger
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.state import State
-from cutsim.solvers.newton import Outcome
+from cutsim.solvers.newton import LINE_SEARCHES, Outcome
 
 logger = collective_logger(__name__)
 
@@ -101,6 +102,7 @@ class StepError(RuntimeError):
     """No equilibrium was found with the smallest step allowed; what was recorded before stays readable."""
 
 
+@checked
 @dataclass(frozen=True)
 class StepControl:
     """How large steps are.
@@ -131,21 +133,24 @@ class StepControl:
     line_searches: tuple[str, ...] = ("l2", "bt")
 
     def __post_init__(self) -> None:
-        require("first", self.first, 0 < self.first < inf, "> 0 and finite")
-        require("largest", self.largest, self.first <= self.largest < inf, f">= first = {self.first} and finite")
-        if not self.smallest:
+        require_number("first", self.first, positive)
+        require_number("largest", self.largest, at_least(self.first, "first"))
+        if self.smallest == 0:
             object.__setattr__(self, "smallest", 1e-3 * self.first)
-        require("smallest", self.smallest, 0 < self.smallest <= self.first, f"in (0, first = {self.first}]")
-        require("growth", self.growth, self.growth > 1, "> 1")
-        require("cut", self.cut, 0 < self.cut < 1, "in (0, 1)")
-        require("damage", self.damage, self.damage is None or 0 < self.damage <= 1, "in (0, 1] or None")
-        require("closure", self.closure, self.closure is None or self.closure > 0, "> 0 or None")
-        require("line_searches", self.line_searches, len(self.line_searches) > 0, "at least one")
+        require_number("smallest", self.smallest, between(0, self.first, "(]", name="first"))
+        require_number("growth", self.growth, above(1))
+        require_number("cut", self.cut, between(0, 1))
+        require_number("easy", self.easy, count(1))
+        require_number("damage", self.damage, between(0, 1, "(]").or_none)
+        require_number("closure", self.closure, positive.or_none)
+        known = len(self.line_searches) > 0 and set(self.line_searches) <= set(LINE_SEARCHES)
+        require("line_searches", self.line_searches, known, f"at least one of {', '.join(LINE_SEARCHES)}")
 
     @classmethod
+    @checked
     def fixed(cls, step: float) -> "StepControl":
         """Equal steps as long as they converge; a step that fails is cut, and later ones grow back."""
-        require("step", step, 0 < step < inf, "> 0 and finite")
+        require_number("step", step, positive)
         return cls(first=step, largest=step)
 
 
@@ -173,6 +178,7 @@ class StepReport:
 Recorder = Callable[[StepReport], None]
 
 
+@checked
 def run(
     problem: Problem,
     until: float,
@@ -199,7 +205,7 @@ def run(
         ValueError: `until` is not later than the committed time, or a body is free to move.
     """
     state = problem.state
-    require("until", until, until > state.time_old, f"> the present time {state.time_old}")
+    require_number("until", until, above(state.time_old, "the present time").or_inf)
     problem.check()
     corners = [c for c in (*problem.corners, until) if c <= until]
     dt, report, number = control.first, None, 0

@@ -5,10 +5,11 @@ from copy import copy
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
+import numpy as np
 from dolfinx import default_scalar_type, fem
 from dolfinx.mesh import Mesh
 
-from cutsim.base.checks import require
+from cutsim.base.checks import finite, require, require_number
 
 Law = TypeVar("Law")
 History = Callable[[float], float]
@@ -99,14 +100,18 @@ class Schedule:
     Args:
         mesh: Mesh of the forms.
         value: A number, or a function of time.
+        name: Name of the parameter as the user wrote it.
 
     Attributes:
         constant: The constant, at first with the value at time 0.
+
+    Raises:
+        ValueError: The value, or that of the function at a time, is not a finite number.
     """
 
-    def __init__(self, mesh: Mesh, value: float | History) -> None:
-        self._history: History = value if callable(value) else lambda _: float(value)
-        self.constant = fem.Constant(mesh, default_scalar_type(self._history(0.0)))
+    def __init__(self, mesh: Mesh, value: float | History, name: str) -> None:
+        self._value, self._name = value, name
+        self.constant = fem.Constant(mesh, default_scalar_type(self._at(0.0)))
 
     @property
     def value(self) -> float:
@@ -115,10 +120,20 @@ class Schedule:
 
     def begin(self, time: float) -> None:
         """Set the constant to its value at a time."""
-        self.constant.value = self._history(time)
+        self.constant.value = self._at(time)
 
     def rates(self, start: float, end: float) -> tuple[float, float]:
         """First and second derivative at a time, from the values there, in the middle and at a later time."""
         half = 0.5 * (end - start)
-        first, second, third = (self._history(t) for t in (start, start + half, end))
+        first, second, third = (self._at(t) for t in (start, start + half, end))
         return (4 * second - 3 * first - third) / (2 * half), (first - 2 * second + third) / half**2
+
+    def _at(self, time: float) -> float:
+        if not callable(self._value):
+            require_number(self._name, self._value, finite)
+            return float(self._value)
+        value = self._value(time)
+        if isinstance(value, np.ndarray) and value.size == 1:
+            value = value.item()
+        require_number(f"{self._name}({time:.6g})", value, finite)
+        return float(value)

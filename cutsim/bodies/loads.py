@@ -4,14 +4,15 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 import ufl
-from dolfinx import fem
+from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import global_dot, nodal_forces, resultant
-from cutsim.base.checks import require
+from cutsim.base.checks import require, require_numbers
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr, cofactor
 from cutsim.base.parameters import History, Schedule
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.state import State
@@ -39,6 +40,7 @@ class Support:
         ValueError: The component does not exist, or no entity is found on any rank.
     """
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -51,15 +53,18 @@ class Support:
         corners: tuple[float, ...] = (),
     ) -> None:
         gdim = state.mesh.geometry.dim
+        require_numbers("corners", corners, least=0)
         require("component", component, component in range(gdim), f"0 … {gdim - 1}")
-        dim = state.mesh.topology.dim - 1 if dim is None else dim
+        tdim = state.mesh.topology.dim
+        require("dim", dim, dim is None or dim in range(tdim + 1), f"0 … {tdim}, or None for facets")
+        dim = tdim - 1 if dim is None else dim
         self.name, self.state, self.component, self.corners = name, state, component, corners
+        self._value = Schedule(state.mesh, value, "value")
         dofs = gdim * locate_dofs(state.V, dim, entities) + component
         owned = len(state.increment)
         self.dofs = dofs[dofs < owned]
         found = state.mesh.comm.allreduce(len(self.dofs))
         require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
-        self._value = Schedule(state.mesh, value)
         self.bc = fem.dirichletbc(self._value.constant, dofs, state.V.sub(component))
 
     @property
@@ -80,11 +85,18 @@ class Load(Term, ABC):
     """Load on a part of the boundary, `_density` per reference area; it follows one factor that varies in time."""
 
     def __init__(
-        self, state: State, facets: NDArray[np.int32], factor: History, name: str, corners: tuple[float, ...]
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        factor: History,
+        parameter: str,
+        name: str,
+        corners: tuple[float, ...],
     ) -> None:
+        require_numbers("corners", corners, least=0)
         self.name, self.state, self._corners = name, state, corners
+        self._factor = Schedule(state.mesh, factor, parameter)
         self._ds = state.measures.exterior(facets)
-        self._factor = Schedule(state.mesh, factor)
         self._scale = self._factor.constant
         self._form = form(self.residual(ufl.TestFunction(state.V)))
         self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
@@ -146,6 +158,7 @@ class Traction(Load):
         ValueError: The direction has the wrong number of components.
     """
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -157,12 +170,12 @@ class Traction(Load):
         corners: tuple[float, ...] = (),
     ) -> None:
         gdim = state.mesh.geometry.dim
-        require("direction", direction, len(direction) == gdim, f"{gdim} numbers")
-        self._direction = direction
-        super().__init__(state, facets, factor, name, corners)
+        require_numbers("direction", direction, length=gdim)
+        self._direction = fem.Constant(state.mesh, np.array(direction, dtype=default_scalar_type))
+        super().__init__(state, facets, factor, "factor", name, corners)
 
     def _density(self) -> Expr:
-        return ufl.as_vector(self._direction)
+        return self._direction
 
 
 class Pressure(Load):
@@ -184,6 +197,7 @@ class Pressure(Load):
 
     symmetric = False
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -193,7 +207,7 @@ class Pressure(Load):
         name: str = "pressure",
         corners: tuple[float, ...] = (),
     ) -> None:
-        super().__init__(state, facets, pressure, name, corners)
+        super().__init__(state, facets, pressure, "pressure", name, corners)
 
     def _density(self) -> Expr:
         gdim = self.state.mesh.geometry.dim

@@ -7,10 +7,11 @@ external:
     M ((1 − α_m) a₁ + α_m a₀) + (1 − α_f) R₁ + α_f R₀ = 0.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
-from cutsim.base.checks import require
+from cutsim.base.checks import at_least, between, positive, require_number
+from cutsim.base.signatures import checked
 
 
 @runtime_checkable
@@ -34,6 +35,7 @@ class Scheme(Protocol):
         """Weight of the new acceleration in the velocity."""
 
 
+@checked
 @dataclass(frozen=True)
 class Newmark:
     """Newmark's scheme; by default the trapezoidal rule, which keeps the energy of a linear system.
@@ -52,8 +54,8 @@ class Newmark:
     gamma: float = 0.5
 
     def __post_init__(self) -> None:
-        require("beta", self.beta, self.beta > 0, "> 0")
-        require("gamma", self.gamma, self.gamma >= 0.5, ">= 0.5: below, steps feed energy in")
+        require_number("beta", self.beta, positive)
+        require_number("gamma", self.gamma, replace(at_least(0.5), words=">= 0.5: below, steps feed energy in"))
 
     @property
     def alpha_m(self) -> float:
@@ -70,6 +72,7 @@ class Newmark:
 TRAPEZOIDAL = Newmark()
 
 
+@checked
 @dataclass(frozen=True)
 class GeneralisedAlpha:
     """Generalised-α scheme: second order, damps what the steps do not resolve and little else.
@@ -88,7 +91,7 @@ class GeneralisedAlpha:
     rho_inf: float
 
     def __post_init__(self) -> None:
-        require("rho_inf", self.rho_inf, 0 <= self.rho_inf <= 1, "in [0, 1]")
+        require_number("rho_inf", self.rho_inf, between(0, 1, "[]"))
 
     @property
     def alpha_m(self) -> float:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import integrate
-from cutsim.base.checks import require
+from cutsim.base.checks import nonnegative, positive, require, require_number
 from cutsim.base.compat import evaluate, expression, form
 from cutsim.base.kinematics import Expr, cofactor, deformation_gradient, green_lagrange
 from cutsim.base.parameters import with_constants
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Multiplier, Term
 from cutsim.bodies.pressure import PressureField
 from cutsim.bodies.quadrature import strain_energy_measures
@@ -55,6 +56,7 @@ class Solid(Term):
         ValueError: A parameter is outside its range.
     """
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -76,8 +78,8 @@ class Solid(Term):
         require("plane", plane, plane == "strain" or not state.axisymmetric, "'strain' in an axisymmetric problem")
         kinds = ("auto", "full", "reduced", "mixed", "taylor-hood")
         require("volumetric", volumetric, volumetric in kinds, f"one of {', '.join(kinds)}")
-        require("viscosity", viscosity, viscosity >= 0, ">= 0")
-        require("density", density, density is None or density > 0, "> 0")
+        require_number("viscosity", viscosity, nonnegative)
+        require_number("density", density, positive.or_none)
         # there λ₃ would depend on the overstress
         require("plane", plane, plane == "strain" or relaxation is None, "'strain' for a material that relaxes")
         self.name = name

@@ -9,7 +9,8 @@ from dolfinx.mesh import CellType, GhostMode, Mesh, create_box, create_rectangle
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import between, count, positive, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.fields.meshing import Marker, TaggedMesh, tag_mesh
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ SIDES = ("notch", "top_left", "top_right", "bottom", "far_left", "far_right", "f
 _GROWTH = 1.3  # ratio of neighbouring sizes beside the band
 
 
+@checked
 def laminate(
     comm: MPI.Comm,
     layers: Mapping[str, float],
@@ -55,12 +57,13 @@ def laminate(
     height = sum(layers.values())
     require("layers", dict(layers), len(layers) > 0 and min(layers.values()) > 0, "at least one, of thickness > 0")
     require("layers", list(layers), not set(layers) & set(SIDES), f"names other than {', '.join(SIDES)}")
-    require("size", size, size > 0, "> 0")
-    require("band", band, 0 < band <= length, f"> 0 and at most the length {length}")
-    require("notch", notch, 0 <= notch < height, f">= 0 and less than the height {height}")
-    require("least", least, least >= 1, ">= 1")
-    require("width", width, width is None or width > 0, "> 0 or None")
-    require("rows", rows, rows >= 1, ">= 1")
+    require_number("size", size, positive)
+    require_number("length", length, positive)
+    require_number("band", band, between(0, length, "(]", name="length"))
+    require_number("notch", notch, between(0, height, "[)", name="height"))
+    require_number("least", least, count(1))
+    require_number("width", width, positive.or_none)
+    require_number("rows", rows, count(1))
     half = _graded(length, size, band)
     bounds = -np.concatenate([[0.0], np.cumsum(list(layers.values()))])
     lines = [np.concatenate([-half[:0:-1], half]), _down(bounds, size, notch, least)[::-1]]

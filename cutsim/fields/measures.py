@@ -47,14 +47,29 @@ class Measures:
         mesh.topology.create_connectivity(self._tdim, self._tdim - 1)
         self._data: dict[str, list[tuple[int, NDArray[np.int32]]]] = {"dx": [], "ds": [], "dS": []}
 
-    def cells(self, cells: Iterable[int] | None = None) -> ufl.Measure:
-        """Measure over local cells (all if None); ghosts are left out."""
-        owned = self.mesh.topology.index_map(self._tdim).size_local
-        chosen = np.arange(owned) if cells is None else np.unique(np.asarray(cells))
-        return self._add("dx", chosen[chosen < owned])
+    def cells(self, cells: Iterable[int] | None = None, name: str = "cells") -> ufl.Measure:
+        """Measure over local cells (all if None); ghosts are left out. Collective.
 
-    def exterior(self, facets: Iterable[int]) -> ufl.Measure:
+        Args:
+            cells: The cells.
+            name: Name of the parameter as the user wrote it.
+
+        Raises:
+            ValueError: There is none on any rank.
+        """
+        owned = self.mesh.topology.index_map(self._tdim).size_local
+        chosen = np.arange(owned) if cells is None else np.unique(np.asarray(cells, dtype=np.int32))
+        chosen = chosen[chosen < owned]
+        found = self.mesh.comm.allreduce(len(chosen))
+        require(name, found, found > 0, "at least one cell")
+        return self._add("dx", chosen)
+
+    def exterior(self, facets: Iterable[int], name: str = "facets") -> ufl.Measure:
         """Measure over local exterior facets; facets of ghost cells are left out. Collective.
+
+        Args:
+            facets: The facets.
+            name: Name of the parameter as the user wrote it.
 
         Raises:
             ValueError: There is none on any rank, or some have no area because they are on the axis of rotation.
@@ -68,7 +83,7 @@ class Measures:
             if len(cells) == 1 and cells[0] < owned:
                 pairs.append((cells[0], int(np.flatnonzero(to_facets.links(cells[0]) == facet)[0])))
         found = self.mesh.comm.allreduce(len(pairs))
-        require("facets", found, found > 0, "at least one exterior facet")
+        require(name, found, found > 0, "at least one exterior facet")
         self._check_area(np.asarray(facets, dtype=np.int32))
         return self._add("ds", np.asarray(pairs))
 

@@ -14,7 +14,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import box
+from cutsim.base.checks import require
 from cutsim.base.compat import create_mesh
+from cutsim.base.signatures import checked
 from cutsim.fields import gmsh_model
 from cutsim.fields.cells import check_cells
 
@@ -30,6 +32,7 @@ Marker = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
 Group = tuple[int, int]
 
 
+@checked
 @dataclass(frozen=True)
 class TaggedMesh:
     """A mesh and the names of its regions.
@@ -81,6 +84,7 @@ class TaggedMesh:
         return self.groups[self.names[name]]
 
 
+@checked
 def geometry(name: str) -> Path:
     """Find a parametrised gmsh geometry that comes with cutsim, for ``read_geo``.
 
@@ -96,6 +100,7 @@ def geometry(name: str) -> Path:
     return known[name]
 
 
+@checked
 def read_geo(
     path: Path | str, comm: MPI.Comm, parameters: Mapping[str, float] | None = None, gdim: int = 3
 ) -> TaggedMesh:
@@ -113,6 +118,7 @@ def read_geo(
     return _read(path, comm, gdim, lambda: gmsh_model.generate(path, parameters or {}, gdim))
 
 
+@checked
 def read_msh(path: Path | str, comm: MPI.Comm, gdim: int = 3) -> TaggedMesh:
     """Read a mesh with groups: .msh of any version, .med, .unv or .cgns. Collective.
 
@@ -132,6 +138,7 @@ def read_msh(path: Path | str, comm: MPI.Comm, gdim: int = 3) -> TaggedMesh:
     return _read(path, comm, gdim, lambda: gmsh_model.open_mesh(path))
 
 
+@checked
 def tag_mesh(mesh: Mesh, cells: Mapping[str, Marker], facets: Mapping[str, Marker]) -> TaggedMesh:
     """Name regions of an existing mesh. Collective.
 
@@ -177,6 +184,7 @@ def _tagged(mesh: Mesh, names: Mapping[str, Group], groups: Mapping[Group, NDArr
 
 def _read(path: Path | str, comm: MPI.Comm, gdim: int, load: Callable[[], None]) -> TaggedMesh:
     """Load a gmsh model on rank 0 and distribute it."""
+    require("gdim", gdim, gdim in (2, 3), "2 or 3")
     if comm.bcast(gmsh.isInitialized()):
         raise ValueError(f"path = {path}: a gmsh session is already open, end it by gmsh.finalize() first")
     model, problem = None, None

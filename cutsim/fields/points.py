@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.compat import EntityMaps, create_submesh, form
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.fields.state import State
 
 #: Degree of the quadrature on interfaces and tool surfaces.
@@ -145,6 +146,7 @@ class FacetPoints:
         return assemble
 
 
+@checked
 @dataclass(frozen=True)
 class Surface:
     """A surface that a tool can touch: its integration points and, for a crack, the side of it.
@@ -158,6 +160,7 @@ class Surface:
     side: Literal["+", "-"] | None = None
 
     @classmethod
+    @checked
     def exterior(cls, state: State, facets: NDArray[np.int32]) -> "Surface":
         """A part of the outer boundary, given by its local facets. Collective."""
         return cls(FacetPoints(state.mesh, facets, state.measures.exterior(facets), interior=False))

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from cutsim.base import kinematics
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.fields.cells import check_cells
 from cutsim.fields.measures import Measures
 
@@ -33,6 +34,7 @@ class State:
             plane.
     """
 
+    @checked
     def __init__(self, V: fem.FunctionSpace, *, axisymmetric: bool = False) -> None:
         check_cells(V.mesh)
         require("V", V.value_shape, V.value_shape == (V.mesh.geometry.dim,), "a vector space of the mesh's dimension")

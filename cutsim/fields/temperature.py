@@ -8,7 +8,8 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import as_array, at_least, finite, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.fields.state import State
 
 
@@ -30,6 +31,7 @@ class Temperature:
         ValueError: The space is not scalar or on another mesh, or an initial temperature is below absolute zero.
     """
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -38,6 +40,7 @@ class Temperature:
         *,
         absolute_zero: float = 0.0,
     ) -> None:
+        require_number("absolute_zero", absolute_zero, finite)
         require("space", space.value_shape, space.value_shape == (), "a scalar space")
         require("space", space.mesh.name, space.mesh is state.mesh, "a space on the mesh of the displacement")
         self.state, self.space, self.absolute_zero = state, space, absolute_zero
@@ -47,8 +50,9 @@ class Temperature:
             require("initial", str(initial), initial.function_space is space, "a function on the temperature's space")
             self.value.x.array[:] = initial.x.array
         elif callable(initial):
-            self.value.interpolate(initial)
+            self.value.interpolate(lambda x: as_array("initial", initial(x)))
         else:
+            require_number("initial", initial, finite)
             self.value.x.array[:] = initial
         self.value.x.scatter_forward()
         self.check("initial", self.minimum())
@@ -60,7 +64,7 @@ class Temperature:
         Raises:
             ValueError: It is below absolute zero, or not a number.
         """
-        require(name, temperature, temperature >= self.absolute_zero, f">= absolute zero = {self.absolute_zero:g}")
+        require_number(name, temperature, at_least(self.absolute_zero, "absolute zero"))
 
     def minimum(self) -> float:
         """Lowest trial temperature at a node. Collective."""

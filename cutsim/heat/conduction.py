@@ -7,10 +7,11 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from cutsim.base.assembly import integrate
-from cutsim.base.checks import require
+from cutsim.base.checks import as_array, positive, require, require_number
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import History, Schedule
+from cutsim.base.signatures import checked
 from cutsim.bodies.solid import Solid
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
@@ -39,6 +40,7 @@ class HeatBody(HeatTerm):
         ValueError: A parameter is outside its range.
     """
 
+    @checked
     def __init__(
         self,
         temperature: Temperature,
@@ -53,19 +55,19 @@ class HeatBody(HeatTerm):
         super().__init__(temperature, name)
         mesh, measures = self.state.mesh, self.state.measures
         density = body.density if density is None and isinstance(body, Solid) else density
-        require("density", density, density is not None and density > 0, "> 0")
+        require_number("density", density, positive)
         assert density is not None
-        require("capacity", capacity, capacity > 0, "> 0")
+        require_number("capacity", capacity, positive)
         self._solid = body if isinstance(body, Solid) else None
         cells = body.cells if isinstance(body, Solid) else body
         self._conductivity = fem.Constant(mesh, _conductivity(conductivity, mesh.geometry.dim))
         self._heat_capacity = fem.Constant(mesh, default_scalar_type(density * capacity))
-        self._source = Schedule(mesh, source)
+        self._source = Schedule(mesh, source, "source")
         degree = temperature.space.ufl_element().degree
         # a marker for each rule, hence a kernel for each: FFCx 0.9 may mix two rules up within a kernel
         nodes = {"quadrature_rule": "vertex", "quadrature_degree": 1}
         points = {"quadrature_degree": 2 * degree}
-        self._dx = measures.cells(cells)(metadata=points)
+        self._dx = measures.cells(cells, "body")(metadata=points)
         self._dx_storage = measures.cells(cells)(metadata=nodes if degree == 1 else points)
         one = fem.Constant(mesh, default_scalar_type(1.0))
         self._volume = integrate(form(one * self._dx_storage))
@@ -121,11 +123,10 @@ def _conductivity(conductivity: float | ArrayLike, gdim: int) -> NDArray[np.floa
     Raises:
         ValueError: It has another shape, is not symmetric, or has a negative eigenvalue.
     """
-    k = np.asarray(conductivity, dtype=default_scalar_type)
+    k = as_array("conductivity", conductivity)
     require("conductivity", conductivity, k.shape in ((), (gdim, gdim)), f"a number or a {gdim} × {gdim} matrix")
     matrix = np.zeros((3, 3), dtype=default_scalar_type)
     matrix[:gdim, :gdim] = k * np.eye(gdim) if k.ndim == 0 else k
-    require("conductivity", conductivity, bool(np.all(np.isfinite(matrix))), "finite")
     require("conductivity", conductivity, np.allclose(matrix, matrix.T), "symmetric")
     require("conductivity", conductivity, bool(np.linalg.eigvalsh(matrix).min() >= 0), ">= 0")
     return matrix

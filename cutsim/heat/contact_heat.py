@@ -1,6 +1,5 @@
 """Laws of heat exchange between two surfaces in contact (docs/theory.md §3.4; thesis 4.58–4.67)."""
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -8,8 +7,9 @@ import numpy as np
 import ufl
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import between, nonnegative, positive, require_number
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.fields.points import Values
 
 
@@ -29,6 +29,7 @@ class HeatLaw(Protocol):
         """Where there is a way for heat between surface and interface, at a pressure."""
 
 
+@checked
 @dataclass(frozen=True)
 class ContactHeat:
     """Heat exchange of two faces with the interface between them (thesis 4.58–4.67).
@@ -55,10 +56,10 @@ class ContactHeat:
 
     def __post_init__(self) -> None:
         for name in ("gamma_plus", "gamma_minus"):
-            require(name, getattr(self, name), 0 < getattr(self, name) < math.inf, "> 0")
+            require_number(name, getattr(self, name), positive)
         for name in ("capacity", "gap_conductance"):
-            require(name, getattr(self, name), 0 <= getattr(self, name) < math.inf, ">= 0")
-        require("fracture_fraction", self.fracture_fraction, 0 <= self.fracture_fraction <= 1, "in [0, 1]")
+            require_number(name, getattr(self, name), nonnegative)
+        require_number("fracture_fraction", self.fracture_fraction, between(0, 1, "[]"))
 
     def exchange(
         self, pressure: Expr, plus: Expr, minus: Expr, source: Expr, contact: Expr, dt: Expr
@@ -98,6 +99,7 @@ class ContactHeat:
         return (pressure > 0) | (self.gap_conductance > 0)
 
 
+@checked
 @dataclass(frozen=True)
 class AdiabaticTool:
     """A tool that exchanges no heat with the body but takes its part of the friction.
@@ -112,7 +114,7 @@ class AdiabaticTool:
     share: float = 1.0
 
     def __post_init__(self) -> None:
-        require("share", self.share, 0 <= self.share <= 1, "in [0, 1]")
+        require_number("share", self.share, between(0, 1, "[]"))
 
     @property
     def capacity(self) -> float:

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.fields.points import Values
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
@@ -44,6 +45,7 @@ class InterfaceHeat(HeatTerm):
         ValueError: The temperature has another state than the crack, or is continuous across it.
     """
 
+    @checked
     def __init__(
         self,
         temperature: Temperature,

@@ -1,6 +1,5 @@
 """Heat through the boundary: given flux, convection, given temperature. All areas are those of the reference."""
 
-import math
 from abc import ABC, abstractmethod
 
 import numpy as np
@@ -9,10 +8,11 @@ from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import integrate
-from cutsim.base.checks import require
+from cutsim.base.checks import nonnegative, require, require_number, require_numbers
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import History, Schedule
+from cutsim.base.signatures import checked
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
@@ -22,12 +22,19 @@ class _SurfaceHeat(HeatTerm, ABC):
     """Heat through a part of the boundary, `_influx` per reference area; it follows one number that varies in time."""
 
     def __init__(
-        self, temperature: Temperature, facets: NDArray[np.int32], value: float | History, name: str, corners: tuple
+        self,
+        temperature: Temperature,
+        facets: NDArray[np.int32],
+        value: float | History,
+        parameter: str,
+        name: str,
+        corners: tuple[float, ...],
     ) -> None:
         super().__init__(temperature, name)
+        require_numbers("corners", corners, least=0)
         self._corners = corners
+        self._value = Schedule(self.state.mesh, value, parameter)
         self._ds = self.state.measures.exterior(facets)
-        self._value = Schedule(self.state.mesh, value)
         self._flow = form(self._influx() * self._ds)
 
     @abstractmethod
@@ -78,6 +85,7 @@ class HeatFlux(_SurfaceHeat):
         ValueError: There is no such facet.
     """
 
+    @checked
     def __init__(
         self,
         temperature: Temperature,
@@ -87,7 +95,7 @@ class HeatFlux(_SurfaceHeat):
         name: str = "flux",
         corners: tuple[float, ...] = (),
     ) -> None:
-        super().__init__(temperature, facets, flux, name, corners)
+        super().__init__(temperature, facets, flux, "flux", name, corners)
 
     def _influx(self) -> Expr:
         return self._value.constant
@@ -108,6 +116,7 @@ class Convection(_SurfaceHeat):
         ValueError: There is no such facet, the coefficient is negative, or the surroundings are below absolute zero.
     """
 
+    @checked
     def __init__(
         self,
         temperature: Temperature,
@@ -118,9 +127,9 @@ class Convection(_SurfaceHeat):
         name: str = "convection",
         corners: tuple[float, ...] = (),
     ) -> None:
-        require("coefficient", coefficient, 0 <= coefficient < math.inf, ">= 0")
+        require_number("coefficient", coefficient, nonnegative)
         self._coefficient = fem.Constant(temperature.state.mesh, default_scalar_type(coefficient))
-        super().__init__(temperature, facets, ambient, name, corners)
+        super().__init__(temperature, facets, ambient, "ambient", name, corners)
         temperature.check("ambient", self._value.value)
 
     def begin(self, time: float) -> None:
@@ -153,6 +162,7 @@ class PrescribedTemperature:
         ValueError: No entity is found on any rank, or the temperature is below absolute zero.
     """
 
+    @checked
     def __init__(
         self,
         temperature: Temperature,
@@ -163,14 +173,17 @@ class PrescribedTemperature:
         dim: int | None = None,
         corners: tuple[float, ...] = (),
     ) -> None:
+        require_numbers("corners", corners, least=0)
         mesh, V = temperature.space.mesh, temperature.space
         self.name, self.temperature, self.corners = name, temperature, corners
-        dofs = locate_dofs(V, mesh.topology.dim - 1 if dim is None else dim, entities)
+        self._value = Schedule(mesh, value, "value")
+        temperature.check("value", self._value.value)
+        tdim = mesh.topology.dim
+        require("dim", dim, dim is None or dim in range(tdim + 1), f"0 … {tdim}, or None for facets")
+        dofs = locate_dofs(V, tdim - 1 if dim is None else dim, entities)
         self._dofs = dofs[dofs < V.dofmap.index_map.size_local]
         found = mesh.comm.allreduce(len(self._dofs))
         require("entities", found, found > 0, f"entities that carry dofs (prescribed temperature {name!r})")
-        self._value = Schedule(mesh, value)
-        temperature.check("value", self._value.value)
         self.bc = fem.dirichletbc(self._value.constant, dofs, V)
 
     def begin(self, time: float) -> None:

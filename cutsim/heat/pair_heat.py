@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from cutsim.base.checks import require
+from cutsim.base.signatures import checked
 from cutsim.base.terms import AssembledTerm
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
@@ -31,6 +32,7 @@ class PairHeat(AssembledTerm[HeatPass], HeatTerm):
         ValueError: The temperature has another state than the pair, or is of higher degree.
     """
 
+    @checked
     def __init__(
         self, temperature: Temperature, pair: SurfacePair, law: ContactHeat, *, name: str | None = None
     ) -> None:

@@ -7,6 +7,7 @@ from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import History, Schedule
+from cutsim.base.signatures import checked
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
 from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
@@ -33,6 +34,7 @@ class ToolHeat(HeatTerm):
         ValueError: The law has a capacity, or the tool's temperature is missing, superfluous or below absolute zero.
     """
 
+    @checked
     def __init__(
         self,
         temperature: Temperature,
@@ -47,7 +49,9 @@ class ToolHeat(HeatTerm):
         require("tool_temperature", tool_temperature, given != adiabatic, "given unless the tool is adiabatic")
         require("law.capacity", law.capacity, law.capacity == 0, "0 for a tool")
         self.tool = tool
-        self._tool_temperature = None if tool_temperature is None else Schedule(self.state.mesh, tool_temperature)
+        self._tool_temperature = (
+            None if tool_temperature is None else Schedule(self.state.mesh, tool_temperature, "tool_temperature")
+        )
         self._check()
         self.exchanges = [
             HeatExchange(temperature, patch.surface.points, law, body, self._opposite(body), self.name)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatBalance, HeatTerm
 from cutsim.heat.conduction import HeatBody
@@ -41,6 +42,7 @@ class HeatTransfer:
         ValueError: A node has no body, or two terms or prescribed temperatures share a name.
     """
 
+    @checked
     def __init__(
         self,
         temperature: Temperature,

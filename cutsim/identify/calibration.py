@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.parameters import numbers, with_numbers
 from cutsim.identify.fitting import Bounds, Fit, Values, fit_model, require_pairs
 from cutsim.identify.response import Response, nominal_stress, unstable_stretches
@@ -42,7 +42,7 @@ class StressTest:
 
     def __post_init__(self) -> None:
         require_pairs("stretch", self.stretch, "stress", self.stress)
-        require("weight", self.weight, self.weight > 0, "> 0")
+        require_number("weight", self.weight, positive)
 
 
 @dataclass(frozen=True)

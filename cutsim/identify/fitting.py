@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, stats
 
-from cutsim.base.checks import require
+from cutsim.base.checks import between, require, require_number
 
 logger = logging.getLogger(__name__)
 Values = dict[str, float]
@@ -66,7 +66,7 @@ class Fit:
         Raises:
             ValueError: The probability is outside its range.
         """
-        require("confidence", confidence, 0 < confidence < 1, "in (0, 1)")
+        require_number("confidence", confidence, between(0, 1))
         half = stats.t.ppf(0.5 + 0.5 * confidence, self._freedom) * np.sqrt(np.diag(self.covariance))
         return {n: (float(v - h), float(v + h)) for (n, v), h in zip(self.values.items(), half, strict=True)}
 

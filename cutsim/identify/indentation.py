@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import between, positive, require, require_number
 from cutsim.identify.fitting import Fit, fit_model, require_pairs
 
 #: Points on the radius, points of the transform, and where its integrand has decayed to rounding.
@@ -57,8 +57,8 @@ def punch_force(
     Raises:
         ValueError: A number is outside its range.
     """
-    require("radius", radius, radius > 0, "> 0")
-    require("thickness", thickness, thickness > 0, "> 0")
+    require_number("radius", radius, positive)
+    require_number("thickness", thickness, positive.or_inf)
     return 4 * shear * radius * layer_factor(radius / thickness, poisson) / (1 - poisson) * np.asarray(depth)
 
 
@@ -105,8 +105,8 @@ def layer_factor(aspect: float, poisson: float) -> float:
     Raises:
         ValueError: A number is outside its range.
     """
-    require("aspect", aspect, 0 <= aspect <= 10, "in [0, 10]")
-    require("poisson", poisson, -1 < poisson <= 0.5, "in (-1, 0.5]")
+    require_number("aspect", aspect, between(0, 10, "[]"))
+    require_number("poisson", poisson, between(-1, 0.5, "(]"))
     return _layer_factor(aspect, poisson, *_gauss(_NODES, 1.0))
 
 

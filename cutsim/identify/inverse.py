@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import optimize
 
 from cutsim.analysis.stepping import StepError
-from cutsim.base.checks import require
+from cutsim.base.checks import between, require, require_number
 from cutsim.identify.fitting import Bounds, Fit, Values, finished, limits_of, require_pairs, require_problem
 from cutsim.results.progress import Progress
 
@@ -128,8 +128,8 @@ def fit_simulation(
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     require_pairs("x", x, "y", y)
     require("method", method, method in _SEARCHES, "one of " + ", ".join(_SEARCHES))
-    require("step", step, 0 < step < 1, "in (0, 1)")
-    require("tolerance", tolerance, 0 < tolerance < 1, "in (0, 1)")
+    require_number("step", step, between(0, 1))
+    require_number("tolerance", tolerance, between(0, 1))
     ranks = MPI.COMM_WORLD.size
     require("workers", workers, workers >= 1 and (workers == 1 or ranks == 1), ">= 1, and 1 on several ranks")
     require_problem(guess, len(y), bounds)

@@ -12,9 +12,10 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import above, between, positive, require_number
 from cutsim.base.functions import exp, if_less, larger, log, sqrt
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 
 _BROKEN = 1e-300  # secant over the intact one that stands for nothing
 _REST = 1e-16  # keeps the derivative of a root finite where it vanishes
@@ -65,7 +66,7 @@ def strength_and_opening(
     given = {"strength": strength, "opening": opening, "toughness": toughness}
     for name, value in given.items():
         if value is not None:
-            require(f"{mode}{name}", value, value > 0, "> 0")
+            require_number(f"{mode}{name}", value, positive)
     if strength is not None and opening is not None:
         implied = factor * strength * opening
         if toughness is not None and abs(toughness - implied) > _AGREE * implied:
@@ -82,6 +83,7 @@ def strength_and_opening(
     raise ValueError(f"give two of {mode}strength, {mode}opening and {mode}toughness; got {given}")
 
 
+@checked
 @dataclass(frozen=True)
 class Exponential:
     """Exponential law of the thesis (4.20), after van den Bosch, Schreurs and Geers.
@@ -105,9 +107,10 @@ class Exponential:
 
     def __post_init__(self) -> None:
         for name in ("t_n", "eps_n", "t_t", "eps_t"):
-            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+            require_number(name, getattr(self, name), positive)
 
     @classmethod
+    @checked
     def from_parameters(
         cls,
         *,
@@ -186,6 +189,7 @@ class ByToughness:
         return self.G_I, self.G_II
 
 
+@checked
 @dataclass(frozen=True)
 class Bilinear(ByToughness):
     """Bilinear mixed-mode law with the Benzeggagh–Kenane criterion (Camanho, Turon et al. 2006).
@@ -214,11 +218,12 @@ class Bilinear(ByToughness):
 
     def __post_init__(self) -> None:
         for name in ("penalty", "t_n", "G_I", "t_t", "G_II", "eta"):
-            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+            require_number(name, getattr(self, name), positive)
         least = max(self.t_n**2 / (2 * self.G_I), self.t_t**2 / (2 * self.G_II))
-        require("penalty", self.penalty, self.penalty > least, f"> strength²/(2 toughness) = {least:g}")
+        require_number("penalty", self.penalty, above(least, "strength²/(2 toughness)"))
 
     @classmethod
+    @checked
     def rigid(cls, t_n: float, G_I: float, t_t: float, G_II: float, eta: float = 2.0, rise: float = 0.01) -> "Bilinear":
         """Make the initially rigid, linear law T = t (1 − δ/δ_c): the intact bond is so stiff that it hardly opens.
 
@@ -230,7 +235,9 @@ class Bilinear(ByToughness):
             eta: Exponent η of the Benzeggagh–Kenane criterion [–].
             rise: Largest part of the final jump that the rise to the peak takes, in either mode, in (0, 1) [–].
         """
-        require("rise", rise, 0 < rise < 1, "in (0, 1)")
+        for name, value in {"t_n": t_n, "G_I": G_I, "t_t": t_t, "G_II": G_II}.items():
+            require_number(name, value, positive)
+        require_number("rise", rise, between(0, 1))
         return cls(max(t_n**2 / (2 * G_I), t_t**2 / (2 * G_II)) / rise, t_n, G_I, t_t, G_II, eta)
 
     def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:

@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import ufl
 
-from cutsim.base.checks import require
+from cutsim.base.checks import nonnegative, positive, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 
 
+@checked
 @dataclass(frozen=True)
 class PenaltyContact:
     """Penalty contact p = ε_N ⟨penetration⟩, quadratic over the first part of the penetration.
@@ -28,14 +30,16 @@ class PenaltyContact:
     blend: float = 0.0
 
     def __post_init__(self) -> None:
-        require("stiffness", self.stiffness, self.stiffness > 0, "> 0")
-        require("blend", self.blend, self.blend >= 0, ">= 0")
+        require_number("stiffness", self.stiffness, positive)
+        require_number("blend", self.blend, nonnegative)
 
     @classmethod
+    @checked
     def automatic(cls, young: float, h: float, factor: float = 10.0, blend: float = 0.0) -> "PenaltyContact":
         """Penalty ε_N = factor · E/h from the neighbouring cells' Young's modulus and size."""
-        require("young", young, young > 0, "> 0")
-        require("h", h, h > 0, "> 0")
+        require_number("young", young, positive)
+        require_number("h", h, positive)
+        require_number("factor", factor, positive)
         return cls(factor * young / h, blend)
 
     def pressure(self, penetration: Expr) -> Expr:

@@ -14,12 +14,13 @@ import ufl
 from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.functions import larger
 from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
 from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.crack_checks import check_cracked
 from cutsim.fields.points import FacetPoints, Surface, Values
@@ -83,6 +84,7 @@ class Crack(Term):
 
     symmetric = False
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -96,9 +98,9 @@ class Crack(Term):
         penetration: float | None = None,
         normal: Literal["current", "reference"] = "current",
     ) -> None:
-        require("young", young, young > 0, "> 0")
+        require_number("young", young, positive)
         require("normal", normal, normal in ("current", "reference"), "'current' or 'reference'")
-        require("penetration", penetration, penetration is None or penetration > 0, "> 0 or None")
+        require_number("penetration", penetration, positive.or_none)
         self.name, self.state, self.law = name, state, law
         self._current = normal == "current"
         self._allowed_penetration = penetration

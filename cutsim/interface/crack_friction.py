@@ -5,10 +5,11 @@ from typing import Literal
 import ufl
 from dolfinx import fem
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.log import collective_logger
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.points import Values
 from cutsim.interface.crack import Crack
@@ -43,6 +44,7 @@ class CrackFriction(Term):
 
     symmetric = False
 
+    @checked
     def __init__(
         self,
         crack: Crack,
@@ -53,7 +55,7 @@ class CrackFriction(Term):
         temperature: fem.Function | None = None,
     ) -> None:
         require("acts_on", acts_on, acts_on in _AREAS, f"one of {', '.join(_AREAS)}")
-        require("stick", stick, stick is None or stick > 0, "> 0 or None")
+        require_number("stick", stick, positive.or_none)
         if acts_on == "thesis":
             logger.warning("%s: open faces rub (friction 'thesis'); use it for comparison only", crack.name)
         self.crack, self.name = crack, f"{crack.name}_friction"

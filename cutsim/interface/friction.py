@@ -9,9 +9,10 @@ from typing import Protocol, runtime_checkable
 
 import ufl
 
-from cutsim.base.checks import require
+from cutsim.base.checks import above, finite, nonnegative, positive, require, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 
 # far below any slip, so that directions are differentiable at rest [length]
 _REST = 1e-20
@@ -34,6 +35,7 @@ class FrictionLaw(Protocol):
         """Traction along the slip since the anchor [stress]; the sliding body feels its opposite."""
 
 
+@checked
 @dataclass(frozen=True)
 class Coulomb:
     """Coulomb friction by return mapping (thesis 4.50–4.55).
@@ -61,13 +63,15 @@ class Coulomb:
     T_damage: float | None = None
 
     def __post_init__(self) -> None:
-        require("mu", self.mu, self.mu >= 0, ">= 0")
-        require("stiffness", self.stiffness, self.stiffness is None or self.stiffness > 0, "> 0 or None")
-        require("viscosity", self.viscosity, self.viscosity >= 0, ">= 0")
+        require_number("mu", self.mu, nonnegative)
+        require_number("stiffness", self.stiffness, positive.or_none)
+        require_number("viscosity", self.viscosity, nonnegative)
+        require_number("T_ref", self.T_ref, finite.or_none)
+        require_number("T_damage", self.T_damage, finite.or_none)
         both = (self.T_ref is None) == (self.T_damage is None)
         require("T_damage", self.T_damage, both, "given together with T_ref, or neither")
         if self.T_ref is not None and self.T_damage is not None:
-            require("T_damage", self.T_damage, self.T_damage > self.T_ref, f"> T_ref = {self.T_ref}")
+            require_number("T_damage", self.T_damage, above(self.T_ref, "T_ref"))
 
     @property
     def compliance(self) -> float:
@@ -94,6 +98,7 @@ class Coulomb:
         return ufl.conditional(stick, self.stiffness, sliding / size) * slip
 
 
+@checked
 @dataclass(frozen=True)
 class SmoothCoulomb:
     """Coulomb friction without stick, t = μ p s/√(|s|² + s₀²) with the slip s of the step.
@@ -110,8 +115,8 @@ class SmoothCoulomb:
     slip: float
 
     def __post_init__(self) -> None:
-        require("mu", self.mu, self.mu >= 0, ">= 0")
-        require("slip", self.slip, self.slip > 0, "> 0")
+        require_number("mu", self.mu, nonnegative)
+        require_number("slip", self.slip, positive)
 
     @property
     def compliance(self) -> float:

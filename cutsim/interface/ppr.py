@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 
-from cutsim.base.checks import require
+from cutsim.base.checks import above, between, positive, require_number
 from cutsim.base.functions import if_less, larger, positive_part
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.interface.cohesive import ByToughness
 
 
+@checked
 @dataclass(frozen=True)
 class ParkPaulinoRoesler(ByToughness):
     """Law with the potential Ψ of Park, Paulino and Roesler (J. Mech. Phys. Solids 57, 2009), often called PPR.
@@ -42,13 +44,13 @@ class ParkPaulinoRoesler(ByToughness):
 
     def __post_init__(self) -> None:
         for name in ("t_n", "G_I", "t_t", "G_II"):
-            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+            require_number(name, getattr(self, name), positive)
         for name, peak in (("alpha", "peak_n"), ("beta", "peak_t")):
             shape, place = getattr(self, name), getattr(self, peak)
-            require(name, shape, shape > 1, "> 1")
+            require_number(name, shape, above(1))
             # beyond this the secant would first rise
             limit = (2 * shape - 1) ** -0.5
-            require(peak, place, 0 < place <= limit, f"in (0, 1/sqrt(2 {name} - 1) = {limit:g}]")
+            require_number(peak, place, between(0, limit, "(]", name=f"1/sqrt(2 {name} - 1)"))
 
     @property
     def final(self) -> tuple[float, float]:

@@ -5,14 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
-from cutsim.base.checks import require
+from cutsim.base.checks import between, finite, positive, require, require_number, require_numbers
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.materials.directions import Direction, require_axes, require_direction, stretches_in, unit
 from cutsim.materials.elastic import WithoutPlaneStress, engineering_constants
 
 _AXES: tuple[Direction, Direction] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
 
+@checked
 @dataclass(frozen=True)
 class TransverselyIsotropic(WithoutPlaneStress):
     """Neo-Hookean solid with one stiffer or softer direction a (Bonet and Burton 1998, with five constants).
@@ -43,8 +45,9 @@ class TransverselyIsotropic(WithoutPlaneStress):
     def __post_init__(self) -> None:
         require_direction("direction", self.direction)
         for name in ("young", "axial_young", "axial_shear"):
-            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
-        require("poisson", self.poisson, -1 < self.poisson < 1, "in (-1, 1)")
+            require_number(name, getattr(self, name), positive)
+        require_number("poisson", self.poisson, between(-1, 1))
+        require_number("axial_poisson", self.axial_poisson, finite)
         require("axial_poisson", self.axial_poisson, self._definite > 0, "such that 1 - nu - 2 nu_a^2 E/E_a > 0")
 
     @property
@@ -68,6 +71,7 @@ class TransverselyIsotropic(WithoutPlaneStress):
         return matrix + (alpha + beta * log_J + gamma * I4) * I4 - 0.5 * alpha * I5, 0.5 * lame * log_J**2
 
 
+@checked
 @dataclass(frozen=True)
 class FungOrthotropic(WithoutPlaneStress):
     """Nearly incompressible exponential solid with three axes, W = c/2 (e^Q − 1) + K/2 (ln J)² (Fung 1979).
@@ -95,9 +99,11 @@ class FungOrthotropic(WithoutPlaneStress):
     axes: tuple[Direction, Direction] = _AXES
 
     def __post_init__(self) -> None:
-        require("modulus", self.modulus, self.modulus > 0, "> 0")
-        require("bulk", self.bulk, self.bulk > 0, "> 0")
-        require("shear", self.shear, len(self.shear) == 3 and min(self.shear) > 0, "three numbers > 0")
+        require_number("modulus", self.modulus, positive)
+        require_number("bulk", self.bulk, positive)
+        require_numbers("normal", self.normal, positive, 3)
+        require_numbers("coupling", self.coupling, length=3)
+        require_numbers("shear", self.shear, positive, 3)
         definite = np.linalg.eigvalsh(self._normal_matrix).min() > 0
         require("normal, coupling", (self.normal, self.coupling), definite, "a positive definite Q")
         require_axes(self.axes)

@@ -13,12 +13,14 @@ from dolfinx import fem
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import finite, require
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 
 Direction = tuple[float, ...] | Expr
 
 
+@checked
 def piecewise_direction(mesh: Mesh, regions: Mapping[tuple[float, ...], NDArray[np.int32]]) -> fem.Function:
     """A direction for each region of cells, as a function that is constant in every cell.
 
@@ -66,7 +68,7 @@ def require_direction(name: str, direction: Any) -> None:
     """
     constant = isinstance(direction, tuple)
     shape = (len(direction),) if constant else getattr(direction, "ufl_shape", None)
-    valid = shape in ((2,), (3,)) and (not constant or any(direction))
+    valid = shape in ((2,), (3,)) and (not constant or (all(d in finite for d in direction) and any(direction)))
     require(name, direction, valid, "two or three numbers, not all zero, or a UFL vector of that size")
 
 

@@ -12,8 +12,9 @@ import numpy as np
 import ufl
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import between, positive, require_number
 from cutsim.base.kinematics import Expr, green_lagrange, small_strain
+from cutsim.base.signatures import checked
 
 
 @runtime_checkable
@@ -79,14 +80,14 @@ class _Isotropic:
     poisson: float
 
     def __post_init__(self) -> None:
-        require("young", self.young, self.young > 0, "> 0")
-        require("poisson", self.poisson, -1 < self.poisson < 0.5, "in (-1, 0.5)")
+        require_number("young", self.young, positive)
+        require_number("poisson", self.poisson, between(-1, 0.5))
 
     @classmethod
     def from_moduli(cls, shear: float, bulk: float) -> Self:
         """Make the material from shear modulus G > 0 and bulk modulus K > 0 [stress]."""
-        require("shear", shear, shear > 0, "> 0")
-        require("bulk", bulk, bulk > 0, "> 0")
+        require_number("shear", shear, positive)
+        require_number("bulk", bulk, positive)
         return cls(*engineering_constants(shear, bulk))
 
     @property
@@ -105,6 +106,7 @@ class _Isotropic:
         return self.bulk - 2 * self.shear / 3
 
 
+@checked
 @dataclass(frozen=True)
 class NeoHookean(_Isotropic):
     """Compressible neo-Hookean solid, W = G/2 (I₁−3) − G ln J + λ/2 (ln J)² (thesis 2.7).
@@ -133,6 +135,7 @@ class NeoHookean(_Isotropic):
         return ufl.exp(y)
 
 
+@checked
 @dataclass(frozen=True)
 class IsochoricNeoHookean(WithoutPlaneStress, _Isotropic):
     """Nearly incompressible neo-Hookean solid, W = G/2 (Ī₁−3) + K/2 (ln J)² (thesis 2.6); polyconvex for J < e."""
@@ -142,6 +145,7 @@ class IsochoricNeoHookean(WithoutPlaneStress, _Isotropic):
         return 0.5 * self.shear * (isochoric_invariant(F) - 3), 0.5 * self.bulk * ufl.ln(ufl.det(F)) ** 2
 
 
+@checked
 @dataclass(frozen=True)
 class StVenantKirchhoff(_Isotropic):
     """St Venant–Kirchhoff solid, W = G E:E + λ/2 (tr E)²: large rotations, small strains."""
@@ -157,6 +161,7 @@ class StVenantKirchhoff(_Isotropic):
         return ufl.sqrt(1 - 2 * self.lame / (self.lame + 2 * self.shear) * (E[0, 0] + E[1, 1]))
 
 
+@checked
 @dataclass(frozen=True)
 class LinearElastic(_Isotropic):
     """Small-strain isotropic solid, W = G ε:ε + λ/2 (tr ε)²."""

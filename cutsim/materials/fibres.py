@@ -12,9 +12,10 @@ import ufl
 from numpy.typing import NDArray
 from scipy.integrate import lebedev_rule
 
-from cutsim.base.checks import require
+from cutsim.base.checks import at_least, between, positive, require, require_number, require_numbers
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.materials.directions import Direction, require_axes, require_direction, squared_stretch, stretches_in
 from cutsim.materials.elastic import Material, WithoutPlaneStress, isochoric_invariant
 
@@ -26,6 +27,7 @@ class FibreLaw(Protocol):
         """Strain energy per reference volume."""
 
 
+@checked
 @dataclass(frozen=True)
 class Reinforced(WithoutPlaneStress):
     """A material with families of fibres; their energies add up, the volumetric part is that of the matrix.
@@ -60,6 +62,7 @@ class Reinforced(WithoutPlaneStress):
         return part + sum(family.energy(F) for family in self.fibres), volumetric
 
 
+@checked
 @dataclass(frozen=True)
 class ExponentialFibres:
     """Exponential-power fibres, W = ξ/(αβ) (exp(α ⟨I₄−1⟩^β) − 1), with I₄ the squared stretch (FEBio fiber-exp-pow).
@@ -83,9 +86,9 @@ class ExponentialFibres:
 
     def __post_init__(self) -> None:
         require_direction("direction", self.direction)
-        require("modulus", self.modulus, self.modulus > 0, "> 0")
-        require("exponential", self.exponential, self.exponential > 0, "> 0")
-        require("power", self.power, self.power >= 2, ">= 2")
+        require_number("modulus", self.modulus, positive)
+        require_number("exponential", self.exponential, positive)
+        require_number("power", self.power, at_least(2))
 
     def energy(self, F: Expr) -> Expr:
         """Strain energy per reference volume."""
@@ -94,6 +97,7 @@ class ExponentialFibres:
         return self.modulus / (self.exponential * self.power) * (ufl.exp(exponent) - 1)
 
 
+@checked
 @dataclass(frozen=True)
 class DispersedFibres:
     """Fibres that scatter about a direction, W = k₁/(2k₂) (exp(k₂ ⟨E⟩²) − 1) (Gasser, Ogden and Holzapfel 2006).
@@ -119,9 +123,9 @@ class DispersedFibres:
 
     def __post_init__(self) -> None:
         require_direction("direction", self.direction)
-        require("k1", self.k1, self.k1 > 0, "> 0")
-        require("k2", self.k2, self.k2 > 0, "> 0")
-        require("dispersion", self.dispersion, 0 <= self.dispersion <= 1 / 3, "in [0, 1/3]")
+        require_number("k1", self.k1, positive)
+        require_number("k2", self.k2, positive)
+        require_number("dispersion", self.dispersion, between(0, 1 / 3, "[]"))
 
     def energy(self, F: Expr) -> Expr:
         """Strain energy per reference volume."""
@@ -137,6 +141,7 @@ _HALF = np.lexsort(np.round(_POINTS, 12))[25:]
 DIRECTIONS, WEIGHTS = _POINTS[:, _HALF].T, 2 * _WEIGHTS[_HALF]
 
 
+@checked
 @dataclass(frozen=True)
 class EllipsoidalFibres:
     """Fibres in all directions, with moduli on an ellipsoid, W = ∫ ξ(n) ⟨I(n)−1⟩^β dA over the unit sphere.
@@ -160,8 +165,8 @@ class EllipsoidalFibres:
     axes: tuple[Direction, Direction] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 
     def __post_init__(self) -> None:
-        require("moduli", self.moduli, len(self.moduli) == 3 and min(self.moduli) > 0, "three numbers > 0")
-        require("power", self.power, self.power >= 2, ">= 2")
+        require_numbers("moduli", self.moduli, positive, 3)
+        require_number("power", self.power, at_least(2))
         require_axes(self.axes)
 
     def energy(self, F: Expr) -> Expr:

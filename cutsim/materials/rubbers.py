@@ -9,8 +9,18 @@ from dataclasses import dataclass
 
 import ufl
 
-from cutsim.base.checks import require
+from cutsim.base.checks import (
+    at_least,
+    between,
+    finite,
+    nonnegative,
+    positive,
+    require,
+    require_number,
+    require_numbers,
+)
 from cutsim.base.kinematics import Expr, right_cauchy_green
+from cutsim.base.signatures import checked
 from cutsim.materials.elastic import WithoutPlaneStress, engineering_constants, isochoric_invariant
 from cutsim.materials.stretches import stretch_power_sums
 
@@ -55,6 +65,7 @@ class _NearlyIncompressible(_WithModuli):
         """Energy of the isochoric part of F."""
 
 
+@checked
 @dataclass(frozen=True)
 class MooneyRivlin(_NearlyIncompressible):
     """Nearly incompressible Mooney–Rivlin solid, W = C₁(Ī₁−3) + C₂(Ī₂−3) + K/2 (ln J)² (thesis 2.9).
@@ -75,9 +86,9 @@ class MooneyRivlin(_NearlyIncompressible):
     bulk: float
 
     def __post_init__(self) -> None:
-        require("c1", self.c1, self.c1 > 0, "> 0")
-        require("c2", self.c2, self.c2 >= 0, ">= 0")
-        require("bulk", self.bulk, self.bulk > 0, "> 0")
+        require_number("c1", self.c1, positive)
+        require_number("c2", self.c2, nonnegative)
+        require_number("bulk", self.bulk, positive)
 
     @property
     def shear(self) -> float:
@@ -92,6 +103,7 @@ class MooneyRivlin(_NearlyIncompressible):
         return self.c1 * (J ** (-2 / 3) * I1 - 3) + self.c2 * (J ** (-4 / 3) * I2 - 3)
 
 
+@checked
 @dataclass(frozen=True)
 class Yeoh(_NearlyIncompressible):
     """Nearly incompressible Yeoh solid, W = Σ Cᵢ (Ī₁−3)ⁱ + K/2 (ln J)², i = 1, 2, 3 (thesis 2.10).
@@ -115,11 +127,12 @@ class Yeoh(_NearlyIncompressible):
     bulk: float
 
     def __post_init__(self) -> None:
-        require("c1", self.c1, self.c1 > 0, "> 0")
-        require("c3", self.c3, self.c3 >= 0, ">= 0")
+        require_number("c1", self.c1, positive)
+        require_number("c2", self.c2, finite)
+        require_number("c3", self.c3, nonnegative)
         stable = self.c2 >= 0 or self.c2**2 < 3 * self.c1 * self.c3
         require("c2", self.c2, stable, "> -sqrt(3 c1 c3), or >= 0")
-        require("bulk", self.bulk, self.bulk > 0, "> 0")
+        require_number("bulk", self.bulk, positive)
 
     @property
     def shear(self) -> float:
@@ -135,6 +148,7 @@ class Yeoh(_NearlyIncompressible):
 LANGEVIN = (1 / 2, 1 / 20, 11 / 1050, 19 / 7000, 519 / 673750)
 
 
+@checked
 @dataclass(frozen=True)
 class ArrudaBoyce(_NearlyIncompressible):
     """Nearly incompressible eight-chain solid of Arruda and Boyce (1993), five terms (thesis 2.11).
@@ -156,9 +170,9 @@ class ArrudaBoyce(_NearlyIncompressible):
     bulk: float
 
     def __post_init__(self) -> None:
-        require("modulus", self.modulus, self.modulus > 0, "> 0")
-        require("links", self.links, self.links >= 1, ">= 1")
-        require("bulk", self.bulk, self.bulk > 0, "> 0")
+        require_number("modulus", self.modulus, positive)
+        require_number("links", self.links, at_least(1))
+        require_number("bulk", self.bulk, positive)
 
     @property
     def shear(self) -> float:
@@ -171,6 +185,7 @@ class ArrudaBoyce(_NearlyIncompressible):
         return self.modulus * series
 
 
+@checked
 @dataclass(frozen=True)
 class Ogden(_WithModuli):
     """Ogden solid, W = Σ μᵢ/mᵢ² (λ₁ᵐ + λ₂ᵐ + λ₃ᵐ − 3 − mᵢ ln J) + c/2 (J−1)² (thesis 2.8).
@@ -192,15 +207,17 @@ class Ogden(_WithModuli):
     volumetric: float
 
     def __post_init__(self) -> None:
-        require("moduli", self.moduli, bool(self.moduli) and min(self.moduli) > 0, "at least one number > 0")
-        as_many = len(self.exponents) == len(self.moduli)
-        require("exponents", self.exponents, as_many and 0 not in self.exponents, "as many as moduli, none zero")
-        require("volumetric", self.volumetric, self.volumetric > 0, "> 0")
+        require_numbers("moduli", self.moduli, positive)
+        require_numbers("exponents", self.exponents, length=len(self.moduli))
+        require("exponents", self.exponents, 0 not in self.exponents, "as many as moduli, none zero")
+        require_number("volumetric", self.volumetric, positive)
 
     @classmethod
+    @checked
     def from_poisson(cls, moduli: tuple[float, ...], exponents: tuple[float, ...], poisson: float) -> "Ogden":
         """Make the material with a Poisson's ratio, 0 < ν < ½, of the small-strain limit."""
-        require("poisson", poisson, 0 < poisson < 0.5, "in (0, 0.5)")
+        require_numbers("moduli", moduli, positive)
+        require_number("poisson", poisson, between(0, 0.5))
         return cls(moduli, exponents, sum(moduli) * poisson / (1 - 2 * poisson))
 
     @property

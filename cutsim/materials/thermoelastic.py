@@ -1,14 +1,15 @@
 """How heat changes a solid: thermal expansion and a shear modulus that depends on temperature (docs/theory.md §3.4)."""
 
-import math
 from dataclasses import dataclass
 
 import ufl
 
-from cutsim.base.checks import require
+from cutsim.base.checks import finite, require_number
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 
 
+@checked
 @dataclass(frozen=True)
 class ThermoElastic:
     """Isotropic thermal expansion F = F_e F_θ, F_θ = ϑ I with ϑ = 1 + α (T − T_ref), and G(T) = G exp(β (T − T_ref)).
@@ -32,7 +33,7 @@ class ThermoElastic:
 
     def __post_init__(self) -> None:
         for name in ("expansion", "reference", "softening"):
-            require(name, getattr(self, name), math.isfinite(getattr(self, name)), "finite")
+            require_number(name, getattr(self, name), finite)
 
     def stretch(self, temperature: Expr) -> Expr:
         """Stretch ϑ of the freely expanded body [–]."""

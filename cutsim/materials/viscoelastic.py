@@ -22,9 +22,10 @@ import ufl
 from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require_numbers
 from cutsim.base.compat import evaluate, expression
 from cutsim.base.kinematics import Expr, green_lagrange
+from cutsim.base.signatures import checked
 from cutsim.fields.state import State
 from cutsim.materials.maxwell import Maxwell
 from cutsim.materials.spring import Spring, symmetric_tensor
@@ -32,6 +33,7 @@ from cutsim.materials.spring import Spring, symmetric_tensor
 Array = NDArray[np.float64]
 
 
+@checked
 @dataclass(frozen=True)
 class Prony:
     """Relaxation function 1 + Σ gᵢ exp(−t/τᵢ), relative to the relaxed stress.
@@ -51,11 +53,8 @@ class Prony:
     times: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        require(
-            "strengths", self.strengths, bool(self.strengths) and min(self.strengths) > 0, "at least one number > 0"
-        )
-        as_many = len(self.times) == len(self.strengths)
-        require("times", self.times, as_many and min(self.times) > 0, "numbers > 0, as many as strengths")
+        require_numbers("strengths", self.strengths, positive)
+        require_numbers("times", self.times, positive, len(self.strengths))
 
     def factors(self, dt: float) -> tuple[Array, Array]:
         """What remains of each overstress after a step, and what it takes up of the change of stress in it."""

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.base.terms import AssembledTerm
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
@@ -53,6 +54,7 @@ class SurfacePair(AssembledTerm[SurfacePass]):
 
     symmetric = False
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -70,14 +72,16 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         search: float | None = None,
         name: str = "pair",
     ) -> None:
-        require("young", young, young > 0, "> 0")
+        require_number("young", young, positive)
         for parameter, value in {"penetration": penetration, "stick": stick, "search": search}.items():
-            require(parameter, value, value is None or value > 0, "> 0 or None")
+            require_number(parameter, value, positive.or_none)
         require("fixed", fixed, fixed or law is None, "True with a cohesive law")
         shared = state.mesh.comm.allreduce(len(np.intersect1d(slave_facets, master_facets)))
         require("slave_facets", shared, shared == 0, "no facet of master_facets")
         self.name, self.state, self.law = name, state, law
-        points = [slave_points(state, facets) for facets in (slave_facets, master_facets)]
+        given = {"slave_facets": slave_facets, "master_facets": master_facets}
+        measures = [state.measures.exterior(facets, parameter) for parameter, facets in given.items()]
+        points = [slave_points(state, facets, ds) for facets, ds in zip(given.values(), measures, strict=True)]
         sizes = [p.mean(facet_size(state.mesh, p.facets)) for p in points]
         self.normal_size = points[0].mean(normal_size(state.mesh, points[0].facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)

@@ -1,6 +1,7 @@
 """One surface against another: jump, law and forces of a step (docs/theory.md §3.5)."""
 
 import numpy as np
+import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -21,7 +22,7 @@ from cutsim.pairs.points import Pairs
 _CHUNK = 10_000
 
 
-def slave_points(state: State, facets: NDArray[np.int32]) -> FacetPoints:
+def slave_points(state: State, facets: NDArray[np.int32], measure: ufl.Measure) -> FacetPoints:
     """The integration points of a slave surface, given by its local exterior facets, ghosts included. Collective.
 
     Raises:
@@ -29,7 +30,6 @@ def slave_points(state: State, facets: NDArray[np.int32]) -> FacetPoints:
     """
     degree = state.V.element.basix_element.degree
     require("degree", degree, degree in DEGREES, "1 or 2: fields on the surfaces of a pair")
-    measure = state.measures.exterior(facets)
     return FacetPoints(state.mesh, facets, measure, interior=False, degree=DEGREES[degree])
 
 

@@ -11,7 +11,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from cutsim.analysis.stepping import Problem, StepError, StepReport
-from cutsim.base.checks import require
+from cutsim.base.checks import nonnegative, require, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.units import Units
 from cutsim.interface.crack import Crack
@@ -58,7 +58,7 @@ class Recording:
         derived: Mapping[str, Expr] | None = None,
         every: int = 5,
     ) -> None:
-        require("every", every, every >= 0, ">= 0")
+        require_number("every", every, nonnegative)
         self.folder, self.problem, self._units = Path(folder), problem, units or Units()
         self._show, self._extra, self._every = dict(show or {}), extra, every
         self.history: dict[str, list[float]] = {}

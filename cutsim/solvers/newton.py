@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base import compat
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.log import collective_logger
 from cutsim.base.options import Options
 from cutsim.base.terms import Multiplier, Term
@@ -164,7 +164,7 @@ class NonlinearProblem:
         rtol: float = 1e-8,
         largest: float = np.inf,
     ) -> None:
-        require("rtol", rtol, rtol > 0.0, "positive")
+        require_number("rtol", rtol, positive)
         self._largest = largest
         self._options = Options(petsc_options_prefix, petsc_options or {})
         self.u, self.bcs = u, list(bcs)

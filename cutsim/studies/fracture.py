@@ -14,7 +14,7 @@ from dolfinx.mesh import compute_midpoints
 from numpy.typing import ArrayLike, NDArray
 
 from cutsim.base.assembly import integrate
-from cutsim.base.checks import require
+from cutsim.base.checks import between, nonnegative, positive, require, require_number, require_numbers
 from cutsim.base.compat import form
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
@@ -63,10 +63,12 @@ class JIntegral:
         gdim = solid.state.mesh.geometry.dim
         plain = not (solid.state.axisymmetric or solid.assembles)
         require("solid", solid.name, plain, "a body that is not axisymmetric, without mixed elements")
-        require("tip", tip, len(tip) == gdim, f"a point of {gdim} coordinates")
-        require("direction", direction, len(direction) == gdim and any(direction), f"{gdim} numbers, not all zero")
-        require("inner", inner, 0 <= inner < outer, f">= 0 and < outer = {outer!r}")
-        require("length", length, length > 0, "> 0")
+        require_numbers("tip", tip, length=gdim)
+        require_numbers("direction", direction, length=gdim)
+        require("direction", direction, any(direction), "not all zero")
+        require_number("outer", outer, positive)
+        require_number("inner", inner, between(0, outer, "[)", name="outer"))
+        require_number("length", length, positive)
         if gdim == 3:
             require("front", front, front is not None and len(front) == 3 and any(front), "3 numbers, not all zero")
         else:
@@ -154,8 +156,8 @@ def plane_modulus(young: float, poisson: float, plane: Literal["strain", "stress
     Raises:
         ValueError: A parameter is outside its range.
     """
-    require("young", young, young > 0, "> 0")
-    require("poisson", poisson, -1 < poisson <= 0.5, "in (-1, 0.5]")
+    require_number("young", young, positive)
+    require_number("poisson", poisson, between(-1, 0.5, "(]"))
     require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
     return young / (1 - poisson**2) if plane == "strain" else young
 
@@ -166,8 +168,8 @@ def stress_intensity(release: float, modulus: float) -> float:
     Raises:
         ValueError: The energy-release rate is negative or the modulus not positive.
     """
-    require("release", release, release >= 0, ">= 0")
-    require("modulus", modulus, modulus > 0, "> 0")
+    require_number("release", release, nonnegative)
+    require_number("modulus", modulus, positive)
     return sqrt(release * modulus)
 
 
@@ -189,7 +191,7 @@ def energy_release_from_compliance(
         ValueError: There are fewer than two lengths, or they do not increase, or the thickness is not positive.
     """
     P, a = np.asarray(loads, dtype=np.float64), _increasing(lengths)
-    require("thickness", thickness, thickness > 0, "> 0")
+    require_number("thickness", thickness, positive)
     return 0.5 * P**2 / thickness * np.gradient(np.asarray(displacements) / P, a)
 
 
@@ -207,7 +209,7 @@ def energy_release_from_energy(energies: ArrayLike, lengths: ArrayLike, thicknes
     Raises:
         ValueError: There are fewer than two lengths, or they do not increase, or the thickness is not positive.
     """
-    require("thickness", thickness, thickness > 0, "> 0")
+    require_number("thickness", thickness, positive)
     return -np.gradient(np.asarray(energies, dtype=np.float64), _increasing(lengths)) / thickness
 
 
@@ -233,8 +235,8 @@ class BentBeam:
     thickness: float
 
     def __post_init__(self) -> None:
-        require("height", self.height, self.height > 0, "> 0")
-        require("thickness", self.thickness, self.thickness > 0, "> 0")
+        require_number("height", self.height, positive)
+        require_number("thickness", self.thickness, positive)
 
     @property
     def span(self) -> float:
@@ -247,7 +249,7 @@ class BentBeam:
         Raises:
             ValueError: The notch is not between 0 and the height.
         """
-        require("notch", notch, 0 < notch < self.height, f"in (0, height = {self.height:g})")
+        require_number("notch", notch, between(0, self.height, name="height"))
         x = notch / self.height
         polynomial = 1.99 - x * (1 - x) * (2.15 - 3.93 * x + 2.7 * x**2)
         return 3 * sqrt(x) * polynomial / (2 * (1 + 2 * x) * (1 - x) ** 1.5)
@@ -295,8 +297,8 @@ class CantileverBeams:
 
     def __post_init__(self) -> None:
         for name in ("height", "thickness", "modulus"):
-            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
-        require("correction", self.correction, self.correction >= 0, ">= 0")
+            require_number(name, getattr(self, name), positive)
+        require_number("correction", self.correction, nonnegative)
 
     @property
     def rigidity(self) -> float:
@@ -316,8 +318,8 @@ class CantileverBeams:
 
 def crack_length_correction(young: float, shear: float) -> float:
     """χ = √(E/(11 G) (3 − 2 (Γ/(1+Γ))²)), Γ = 1.18 E/G, of isotropic arms (Williams 1989) [–]; 0.663 for ν = 0.3."""
-    require("young", young, young > 0, "> 0")
-    require("shear", shear, shear > 0, "> 0")
+    require_number("young", young, positive)
+    require_number("shear", shear, positive)
     gamma = 1.18 * young / shear
     return sqrt(young / (11 * shear) * (3 - 2 * (gamma / (1 + gamma)) ** 2))
 
@@ -359,10 +361,11 @@ class EndNotchedBeam:
     friction: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("height", "thickness", "half_span", "modulus", "shear"):
-            require(name, getattr(self, name), getattr(self, name) > 0, "> 0")
+        for name in ("height", "thickness", "half_span", "modulus"):
+            require_number(name, getattr(self, name), positive)
+        require_number("shear", self.shear, positive.or_inf)
         for name in ("correction", "friction"):
-            require(name, getattr(self, name), getattr(self, name) >= 0, ">= 0")
+            require_number(name, getattr(self, name), nonnegative)
 
     def release(self, load: float, length: float) -> float:
         """Energy-release rate G in sliding under a load P, with a crack of the given length [force/length].
@@ -398,10 +401,10 @@ class EndNotchedBeam:
         Raises:
             ValueError: The crack does not end between pin and load, or the toughness is not positive.
         """
-        require("toughness", toughness, toughness > 0, "> 0")
+        require_number("toughness", toughness, positive)
         load = sqrt(toughness / self.release(1.0, length))
         return load, load * self.compliance(length)
 
     def _effective(self, length: float) -> float:
-        require("length", length, 0 < length < self.half_span, f"in (0, half_span = {self.half_span:g})")
+        require_number("length", length, between(0, self.half_span, name="half_span"))
         return length + self.correction * self.height

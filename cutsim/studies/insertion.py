@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
-from cutsim.base.checks import require
+from cutsim.base.checks import above, at_least, between, nonnegative, positive, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh
@@ -112,6 +113,7 @@ class Insertion:
     separation: tuple[NDArray[np.float64], NDArray[np.float64]]
 
     @classmethod
+    @checked
     def build(
         cls,
         domain: TaggedMesh,
@@ -143,11 +145,12 @@ class Insertion:
         Raises:
             ValueError: A parameter is outside its range or the mesh lacks a group.
         """
-        tip = TIP_IN_NOTCH * notch
         check_tool("tool", tool, notch, domain.mesh.geometry.dim)
-        require("friction", friction, friction >= 0, ">= 0")
-        require("insertion", insertion, insertion > 0, "> 0")
-        require("turn", turn, turn is None or turn > tip, f"> {tip}, where the push begins, or None")
+        tip = TIP_IN_NOTCH * notch
+        require_number("friction", friction, nonnegative)
+        require_number("insertion", insertion, positive)
+        require_number("turn", turn, above(tip, "the start of the push").or_none)
+        require_number("viscosity", viscosity, nonnegative)
         height = check_block(domain, notch)
         mesh, revolved = domain.mesh, isinstance(tool, Needle) and domain.mesh.geometry.dim == 2
         state = State(cracked_space(mesh, ("Lagrange", 1, (mesh.geometry.dim,)), _slit(domain)), axisymmetric=revolved)
@@ -200,8 +203,8 @@ class Insertion:
         Raises:
             ValueError: The push begins deeper, or there is no such push.
         """
-        require("depth", depth, depth >= self.tip, f">= {self.tip}, where the push begins")
-        require("depth", depth, depth < self.height, f"< {self.height:g}, the height of the block")
+        require_number("depth", depth, at_least(self.tip, "start of the push"))
+        require_number("depth", depth, between(self.tip, self.height, "[)", name="height"))
         last = 1 if self.turn is None else 2
         require("push", push, push in range(1, last + 1), f"1 … {last}")
         back = 0.0 if self.turn is None or push == 1 else 2 * (self.turn - self.tip)
@@ -293,7 +296,7 @@ def check_tool(name: str, tool: Blade | Needle, notch: float, gdim: int) -> None
     Raises:
         ValueError: It is too blunt for the notch, halved, points elsewhere or has the components of another dimension.
     """
-    require("notch", notch, notch > tool.tip_radius, f"> the tip radius {tool.tip_radius} of the {name}")
+    require_number("notch", notch, above(tool.tip_radius, f"the tip radius of the {name}"))
     require(f"{name}.side", tool.side, tool.side == 0, "0, the whole tool")
     down = len(tool.push) == gdim and tool.push[1] == -1
     require(f"{name}.push", tool.push, down, f"along −y, of {gdim} components")

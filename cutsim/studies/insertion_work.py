@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from cutsim.base.checks import require
+from cutsim.base.checks import between, require, require_number
 from cutsim.studies.insertion import Insertion
 from cutsim.tools.tool_parts import PARTS
 
@@ -67,7 +67,7 @@ def force_parts(history: History, whole: float, window: float) -> dict[str, Arra
     pushed = _first_push(history["depth"])
     depth = history["depth"][pushed]
     way = float(np.ptp(depth))
-    require("window", window, 0 < window <= way, f"> 0 and at most the way pushed, {way:.4g}")
+    require_number("window", window, between(0, way, "(]", name="way pushed"))
     ends = depth[-1] - window * np.arange(int(way / window * (1 + 1e-9)) + 1)[::-1]
 
     def rate(work: Array) -> Array:

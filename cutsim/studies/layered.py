@@ -7,7 +7,8 @@ from typing import Self
 
 import numpy as np
 
-from cutsim.base.checks import require
+from cutsim.base.checks import nonnegative, positive, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh
 from cutsim.fields.space import cracked_space
@@ -22,6 +23,7 @@ from cutsim.results.recording import Columns
 _PLUS = (-1.0, 0.0, 0.0)
 
 
+@checked
 @dataclass(frozen=True)
 class Layer:
     """A layer of a block.
@@ -42,7 +44,7 @@ class Layer:
     law: CohesiveLaw
 
     def __post_init__(self) -> None:
-        require("thickness", self.thickness, self.thickness > 0, "> 0")
+        require_number("thickness", self.thickness, positive)
 
 
 def skin(epidermis: CohesiveLaw, dermis: CohesiveLaw, hypodermis: CohesiveLaw) -> tuple[Layer, ...]:
@@ -85,6 +87,7 @@ class LayeredBlock:
     notch: Crack | None
 
     @classmethod
+    @checked
     def build(cls, layers: Sequence[Layer], domain: TaggedMesh, *, damping: float = 0.0) -> Self:
         """Put solids and cracks on a mesh. Collective.
 
@@ -97,7 +100,7 @@ class LayeredBlock:
             ValueError: A parameter is outside its range, or the mesh lacks a layer.
         """
         require("layers", len(layers), len(layers) > 0, "at least one layer")
-        require("damping", damping, damping >= 0, ">= 0")
+        require_number("damping", damping, nonnegative)
         mesh, cells = domain.mesh, [domain.cells(layer.name) for layer in layers]
         notched = "notch" in domain.names
         broken = [domain.facets("notch")] if notched else []

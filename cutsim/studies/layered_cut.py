@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.base.checks import require
+from cutsim.base.checks import at_least, nonnegative, positive, require, require_number
 from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.interface.crack import Crack
@@ -69,9 +69,9 @@ class LayeredCut:
         """
         require("blade", blade, isinstance(blade, Blade), "a Blade: a needle makes no planar crack in layers")
         check_tool("blade", blade, notch, block.domain.mesh.geometry.dim)
-        require("friction", friction, friction >= 0, ">= 0")
-        require("drawn", drawn, drawn >= 0, ">= 0")
-        require("insertion", insertion, insertion > 0, "> 0")
+        require_number("friction", friction, nonnegative)
+        require_number("drawn", drawn, nonnegative)
+        require_number("insertion", insertion, positive)
         mouth, tip = block.notch, TIP_IN_NOTCH * notch
         if mouth is None:
             raise ValueError("block has no notch; allowed is one on a mesh that was made with a notch")
@@ -91,7 +91,7 @@ class LayeredCut:
 
     def time_of(self, depth: float) -> float:
         """Time at which the tip is this deep below the top [time]."""
-        require("depth", depth, depth >= self.tip, f">= {self.tip}, where the push begins")
+        require_number("depth", depth, at_least(self.tip, "start of the push"))
         return self.insertion + depth - self.tip
 
     def columns(self, columns: Columns) -> Columns:

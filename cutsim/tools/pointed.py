@@ -8,9 +8,10 @@ import numpy as np
 import ufl
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import above, between, positive, require, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit
 
 
@@ -100,9 +101,9 @@ class Pointed(ABC):
 
     def _check(self, width: str) -> None:
         """Refuse values outside their range; directions become unit vectors."""
-        require("half_angle", self.half_angle, 0 < self.half_angle < pi / 2, "in (0, pi/2) rad")
-        require("tip_radius", self.tip_radius, self.tip_radius > 0, "> 0")
-        require(width, self.width, self.width > self.tip_radius, f"> tip_radius = {self.tip_radius}")
+        require_number("half_angle", self.half_angle, between(0, pi / 2, name="π/2"))
+        require_number("tip_radius", self.tip_radius, positive)
+        require_number(width, self.width, above(self.tip_radius, "tip_radius"))
         require("side", self.side, self.side in (-1, 0, 1), "-1, 0 or 1")
         object.__setattr__(self, "push", unit("push", self.push))
         require("lateral", self.lateral, self.side == 0 or self.lateral is not None, "a direction, to halve the tool")
@@ -114,6 +115,7 @@ class Pointed(ABC):
             require("lateral", self.lateral, abs(inner) < 1e-12, "orthogonal to push")
 
 
+@checked
 @dataclass(frozen=True)
 class Blade(Pointed):
     """Wedge blade: rounded tip, flank at the half angle, parallel shank; its edge extends without end.
@@ -153,6 +155,7 @@ class Blade(Pointed):
         return abs(across) if self.side == 0 else self.side * across
 
 
+@checked
 @dataclass(frozen=True)
 class Needle(Pointed):
     """Round needle: cone with a rounded tip, cylindrical shaft; for 3-D and bodies of revolution.

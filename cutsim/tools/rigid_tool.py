@@ -6,7 +6,7 @@ import numpy as np
 from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import as_array, require
 from cutsim.base.terms import Term
 from cutsim.fields.state import State
 from cutsim.interface.slip import SlipHistory
@@ -33,8 +33,7 @@ class RigidTool(Term):
 
     def __init__(self, state: State, path: Path, name: str) -> None:
         gdim = state.mesh.geometry.dim
-        start = np.asarray(path.position(0.0), dtype=float)
-        require("path", start.shape, start.shape == (gdim,), f"positions of {gdim} components")
+        start = _position(path, 0.0, gdim)
         self.name, self.state, self.path = name, state, path
         self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
         self._position_old = start.copy()
@@ -62,7 +61,7 @@ class RigidTool(Term):
 
     def begin(self, time: float) -> None:
         """Move the tool to its position at the end of the step."""
-        self.position.value[:] = self.path.position(time)
+        self.position.value[:] = _position(self.path, time, len(self.position.value))
 
     def external_work(self) -> float:
         """Work of the tool on the body in the step: mean force times increment. Collective."""
@@ -100,3 +99,10 @@ class RigidTool(Term):
         """Adopt position, force and moment."""
         self._position_old[:] = self.position.value
         self._action_old = self._action
+
+
+def _position(path: Path, time: float, gdim: int) -> NDArray[np.float64]:
+    """Where a path is, if that is a place of the mesh's dimension."""
+    position = as_array(f"path({time:.6g})", path.position(time))
+    require(f"path({time:.6g})", position, position.shape == (gdim,), f"a position of {gdim} components")
+    return position

@@ -14,8 +14,9 @@ import numpy as np
 import ufl
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import above, as_array, positive, require, require_number, require_numbers
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 
 Direction = tuple[float, ...]
 
@@ -34,6 +35,7 @@ class Shape(Protocol):
 
 def unit(name: str, vector: Direction) -> Direction:
     """Unit vector along one that the user gave under a name."""
+    require_numbers(name, vector)
     norm = float(np.linalg.norm(vector))
     require(name, vector, len(vector) in (2, 3) and norm > 0, "a non-zero vector of 2 or 3 numbers")
     return tuple(float(v) / norm for v in vector)
@@ -67,6 +69,7 @@ def from_axis(x: Expr, push: Direction, scale: float) -> Expr:
     return ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * scale) ** 2)
 
 
+@checked
 @dataclass(frozen=True)
 class Ball:
     """Sphere in 3-D, cylinder (or wire) in 2-D or, with an axis, in 3-D; the reference point is the centre.
@@ -83,7 +86,7 @@ class Ball:
     axis: Direction | None = None
 
     def __post_init__(self) -> None:
-        require("radius", self.radius, self.radius > 0, "> 0")
+        require_number("radius", self.radius, positive)
         if self.axis is not None:
             object.__setattr__(self, "axis", unit("axis", self.axis))
 
@@ -98,6 +101,7 @@ class Ball:
         return ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * self.radius) ** 2) - self.radius
 
 
+@checked
 @dataclass(frozen=True)
 class FlatPunch:
     """Flat-ended punch, circular in 3-D and a strip in 2-D, with a rounded edge; reference point on the face.
@@ -116,8 +120,8 @@ class FlatPunch:
     push: Direction = (0.0, -1.0)
 
     def __post_init__(self) -> None:
-        require("edge_radius", self.edge_radius, self.edge_radius > 0, "> 0")
-        require("radius", self.radius, self.radius > self.edge_radius, f"> edge_radius = {self.edge_radius}")
+        require_number("edge_radius", self.edge_radius, positive)
+        require_number("radius", self.radius, above(self.edge_radius, "edge_radius"))
         object.__setattr__(self, "push", unit("push", self.push))
 
     @property
@@ -136,6 +140,7 @@ class FlatPunch:
         return ufl.conditional(ufl.gt(across, below), side, face) - r
 
 
+@checked
 @dataclass(frozen=True)
 class Plane:
     """Half-space behind a plane through the reference point.
@@ -162,6 +167,7 @@ class Plane:
         return along(x, self.normal)
 
 
+@checked
 @dataclass(frozen=True)
 class Path:
     """Prescribed motion of a tool's reference point.
@@ -174,21 +180,28 @@ class Path:
     position: Callable[[float], NDArray[np.float64]]
     corners: tuple[float, ...] = field(default=())
 
+    def __post_init__(self) -> None:
+        require_numbers("corners", self.corners, least=0)
+
     @classmethod
+    @checked
     def polyline(cls, times: Sequence[float], points: Sequence[Sequence[float]]) -> "Path":
         """Straight motion between points, at rest before the first and after the last time.
 
         Raises:
             ValueError: Times do not increase or their number differs from that of the points.
         """
-        t, p = np.asarray(times, dtype=float), np.asarray(points, dtype=float)
-        require("times", list(times), t.ndim == 1 and bool(np.all(np.diff(t) > 0)), "increasing")
+        require_numbers("times", times)
+        t = np.asarray(times, dtype=float)
+        require("times", list(times), bool(np.all(np.diff(t) > 0)), "increasing")
+        p = as_array("points", points)
         require("points", p.shape, p.ndim == 2 and len(p) == len(t), f"one row for each of the {len(t)} times")
         return cls(
             lambda s: np.array([np.interp(s, t, p[:, i]) for i in range(p.shape[1])]), tuple(float(v) for v in t)
         )
 
     @classmethod
+    @checked
     def saw(
         cls,
         start: Sequence[float],
@@ -204,6 +217,9 @@ class Path:
             stroke: Full stroke of the sawing motion, a vector [length].
             period: Duration of a stroke to and fro > 0 [time].
         """
-        require("period", period, period > 0, "> 0")
+        require_number("period", period, positive)
+        require_numbers("start", start)
+        for name, vector in {"velocity": velocity, "stroke": stroke}.items():
+            require_numbers(name, vector, length=len(start))
         x, v, a = (np.asarray(w, dtype=float) for w in (start, velocity, stroke))
         return cls(lambda s: x + v * s + 0.5 * a * np.sin(2 * pi * s / period))

@@ -13,6 +13,7 @@ from cutsim.base.compat import EntityMaps, form
 from cutsim.base.kinematics import Expr, tangential
 from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
+from cutsim.base.signatures import checked
 from cutsim.fields.points import Surface, Values
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
@@ -117,6 +118,7 @@ class ToolContact(RigidTool):
         ValueError: No surface is given, or the path has another dimension than the mesh.
     """
 
+    @checked
     def __init__(
         self,
         state: State,

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import ufl
 
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.points import Values
 from cutsim.tools.pointed import Pointed
@@ -29,6 +30,7 @@ class ToolParts(Term):
         name: Name in messages.
     """
 
+    @checked
     def __init__(self, tools: Sequence[ToolContact], shape: Pointed, name: str = "tool_parts") -> None:
         self.name = name
         self._shaft = shape.shaft_height

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import add_blocks, moment
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.base.terms import AssembledTerm
 from cutsim.fields.sizes import facet_size
 from cutsim.fields.state import State
@@ -75,6 +76,7 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
 
     symmetric = False
 
+    @checked
     def __init__(
         self,
         state: State,
@@ -89,9 +91,9 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
     ) -> None:
         super().__init__(state, path, name)
         gdim = state.mesh.geometry.dim
-        require("search", search, search is None or search > 0, "> 0 or None")
+        require_number("search", search, positive.or_none)
         require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
-        points = slave_points(state, facets)
+        points = slave_points(state, facets, state.measures.exterior(facets))
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, self.position, self._position_old)
         self._search = search or size

@@ -13,8 +13,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.log import collective_logger
+from cutsim.base.signatures import checked
 
 logger = collective_logger(__name__)
 
@@ -24,6 +25,7 @@ SAME = 1e-7
 _KINDS = {3: "triangle", 2: "line"}
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Triangulation:
     """Closed surface of a rigid body: triangles in 3-D, segments in 2-D.
@@ -62,6 +64,7 @@ class Triangulation:
         object.__setattr__(self, "facets", facets)
 
     @classmethod
+    @checked
     def read(cls, file: Path | str, scale: float = 1.0, *, comm: MPI.Comm = MPI.COMM_WORLD) -> "Triangulation":
         """Read a surface on the first rank: STL, OBJ, PLY and whatever else meshio reads. Collective.
 
@@ -73,7 +76,7 @@ class Triangulation:
         Raises:
             ValueError: The scale is not positive, the file cannot be read, or its surface is refused.
         """
-        require("scale", scale, scale > 0, "> 0")
+        require_number("scale", scale, positive)
         surface, problem = None, ""
         if comm.rank == 0:
             try:
