@@ -126,7 +126,7 @@ def test_parameters_are_refused_by_name():
     [
         ({}, {}, {"notch": 1.5}, r"notch = 1.5 .* 0.5, the depth of the group 'notch'"),
         ({}, {"half_angle": 1.5}, {}, r"tool.half_angle = 1.5 .* in radians"),
-        ({"H": 2.0}, {}, {"depth": 2.5}, r"depth = 2.5 .*< 2, the height of the block"),
+        ({"H": 2.0}, {}, {"depth": 2.5}, r"depth = 2.5 .*the height of the block = 2"),
         ({}, {"push": (0.0, -1.0, 0.0), "lateral": (1.0, 0.0, 0.0)}, {}, r"tool.push = .* of 2 components"),
     ],
     ids=["another notch", "degrees", "deeper than the block", "of another dimension"],

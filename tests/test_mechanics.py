@@ -183,6 +183,15 @@ def test_reactions_balance_a_dead_load():
     np.testing.assert_allclose(rows["energy_closure"], 0, atol=1e-3)
 
 
+def test_another_direction_of_a_traction_needs_no_other_kernel():
+    def signature(direction):
+        b = make_blocks()
+        load = Traction(b.state, b.face(1, 1.0), direction, lambda t: t)
+        return load.residual(ufl.TestFunction(b.state.V)).signature()
+
+    assert signature((0.0, 1.0)) == signature((3.0, -0.7))
+
+
 @pytest.mark.parametrize(
     ("make", "name"),
     [

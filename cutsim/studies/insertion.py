@@ -203,8 +203,8 @@ class Insertion:
         Raises:
             ValueError: The push begins deeper, or there is no such push.
         """
-        require_number("depth", depth, at_least(self.tip, "start of the push"))
-        require_number("depth", depth, between(self.tip, self.height, "[)", name="height"))
+        require_number("depth", depth, at_least(self.tip, "the start of the push"))
+        require_number("depth", depth, between(self.tip, self.height, "[)", name="the height of the block"))
         last = 1 if self.turn is None else 2
         require("push", push, push in range(1, last + 1), f"1 … {last}")
         back = 0.0 if self.turn is None or push == 1 else 2 * (self.turn - self.tip)

@@ -91,7 +91,7 @@ class LayeredCut:
 
     def time_of(self, depth: float) -> float:
         """Time at which the tip is this deep below the top [time]."""
-        require_number("depth", depth, at_least(self.tip, "start of the push"))
+        require_number("depth", depth, at_least(self.tip, "the start of the push"))
         return self.insertion + depth - self.tip
 
     def columns(self, columns: Columns) -> Columns:

@@ -101,7 +101,7 @@ class Pointed(ABC):
 
     def _check(self, width: str) -> None:
         """Refuse values outside their range; directions become unit vectors."""
-        require_number("half_angle", self.half_angle, between(0, pi / 2, name="π/2"))
+        require_number("half_angle", self.half_angle, between(0, pi / 2, name="π/2 rad"))
         require_number("tip_radius", self.tip_radius, positive)
         require_number(width, self.width, above(self.tip_radius, "tip_radius"))
         require("side", self.side, self.side in (-1, 0, 1), "-1, 0 or 1")
