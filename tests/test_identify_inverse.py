@@ -51,6 +51,39 @@ def test_both_methods_find_the_parameters(method):
     assert fit.rmse == pytest.approx(0.01, rel=0.3)
 
 
+WAY = np.concatenate([np.linspace(0, 2, 21), np.linspace(1.9, 1, 10), np.linspace(1.1, 3, 20)])
+
+
+STEPS = np.concatenate([np.linspace(0, 2.03, 40), np.linspace(2.0, 0.97, 30), np.linspace(1.0, 3, 40)])
+
+
+def tool(values, way=STEPS):
+    """Force in a push, back and a push with less: friction changes its sign, and what is cut does not resist again."""
+    deepest = np.maximum.accumulate(way)
+    cutting = np.where(way >= deepest, 1.0 + 0.3 * way, 0.0)
+    return way, values["toughness"] * cutting + values["friction"] * np.sign(np.diff(way, prepend=-1.0)) * way
+
+
+def test_a_way_back_is_compared_leg_by_leg():
+    """Push, back and push: each point is compared with its own leg; noise of the way is no turn."""
+    true = {"toughness": 1.0, "friction": 0.4}
+    rng = np.random.default_rng(0)
+    exact = tool(true, WAY)[1]
+    keep = np.arange(len(WAY)) != 40  # where the second push meets the uncut, which the simulation does a little later
+    x = (WAY + 0.002 * rng.standard_normal(len(WAY)))[keep]
+    y = (exact + 0.01 * rng.standard_normal(len(WAY)))[keep]
+    fit = fit_simulation(tool, {"toughness": 0.5, "friction": 0.2}, x, y, tolerance=1e-5)
+    assert fit.values == pytest.approx(true, rel=0.02)
+
+
+@pytest.mark.mpi
+def test_other_turns_than_measured_are_refused():
+    with pytest.raises(ValueError, match=r"turns of the simulation = 0 .* 2, as often as x turns back \(at 1.9, 1.1"):
+        fit_simulation(spring, GUESS, WAY, WAY)
+    with pytest.raises(ValueError, match=r"turns of the simulation = 2 .* 0, as often as x turns back"):
+        fit_simulation(tool, {"toughness": 0.5, "friction": 0.2}, X, X)
+
+
 def test_a_failed_simulation_is_a_bad_fit(caplog):
     start = {"stiffness": 2.5, "decay": 0.8}
     with caplog.at_level(logging.WARNING):

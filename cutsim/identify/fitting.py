@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +14,10 @@ from scipy import optimize, stats
 from cutsim.base.checks import between, require, require_number
 
 logger = logging.getLogger(__name__)
+#: Chance of the runs of the residuals below which they are taken for systematic.
+_UNLIKELY = 0.01
+#: Residuals, relative to the data, that are no noise but rounding and tolerances.
+_ROUNDING = 1e-6
 Values = dict[str, float]
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -54,6 +59,30 @@ class Fit:
         return 1 - (1 - self.r_squared) * (len(self.residuals) - 1) / self._freedom
 
     @property
+    def chance(self) -> float:
+        """Probability that independent noise has no more runs of one sign than the residuals (Wald and Wolfowitz 1940).
+
+        If it is small the residuals are systematic: the model is wrong, and the intervals are not to be believed.
+        """
+        above = self.residuals > 0
+        n, m = int(above.sum()), int((~above).sum())
+        if min(n, m) == 0:
+            return 2.0 ** (1 - len(above))
+        runs = 1 + int(np.count_nonzero(np.diff(above)))
+        # r runs: the values above cut in k pieces and those below in as many, or one more of either
+        ways = sum(
+            comb(n - 1, (r - 1) // 2) * comb(m - 1, r // 2 - 1) + comb(n - 1, r // 2 - 1) * comb(m - 1, (r - 1) // 2)
+            for r in range(2, runs + 1)
+        )
+        return ways / comb(n + m, n)
+
+    @property
+    def systematic(self) -> bool:
+        """Whether the residuals are no noise: more than rounding, and of a chance below one per cent."""
+        size = float(np.sqrt(np.mean(self.measured**2)))
+        return self.rmse > _ROUNDING * size and self.chance < _UNLIKELY
+
+    @property
     def _freedom(self) -> int:
         return len(self.residuals) - len(self.values)
 
@@ -76,7 +105,8 @@ class Fit:
             for name, (low, high) in self.intervals().items()
         ]
         quality = f"SSE {self.sse:.4g}, R² {self.r_squared:.5f}, adjusted {self.adjusted_r_squared:.5f}"
-        return "\n".join([*rows, f"{quality}, RMSE {self.rmse:.4g}"])
+        doubt = ["the residuals are systematic: the intervals are not to be believed"] if self.systematic else []
+        return "\n".join([*rows, f"{quality}, RMSE {self.rmse:.4g}", *doubt])
 
 
 def fit_model(
@@ -195,4 +225,11 @@ def finished(
     variance = residuals @ residuals / (len(residuals) - len(names))
     half = (rows.T / singular) * scale[:, None]
     values = {name: float(value) for name, value in zip(names, x, strict=True)}
-    return Fit(values, variance * half @ half.T, measured, residuals)
+    fit = Fit(values, variance * half @ half.T, measured, residuals)
+    if fit.systematic:
+        logger.warning(
+            "residuals are systematic (by chance once in %.0f times): the model or a zero of the data is wrong, and no "
+            "interval is to be believed",
+            1 / fit.chance,
+        )
+    return fit

@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from functools import partial
+from itertools import pairwise
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Literal
@@ -27,6 +28,8 @@ Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 Simulation = Callable[[Values], tuple[ArrayLike, ArrayLike]]
 Vector = NDArray[np.float64]
 
+#: Way back, in parts of the range of the abscissae, up to which it is noise.
+_NOISE = 0.01
 #: Residuals of a simulation that found no equilibrium, in largest measured values.
 _FAILURE = 10.0
 
@@ -103,11 +106,15 @@ def fit_simulation(
     rank, ``workers`` processes with a simulation each.  These start anew, so that ``simulate`` must be a function of a
     module, and a script needs its ``if __name__ == "__main__"``.
 
+    A curve that turns back, such as a push, a way back and another push, is compared leg by leg, in the order in which
+    the points are given.
+
     Args:
-        simulate: Parameters -> abscissae, which grow, and ordinates; the same on all ranks.  A `StepError` counts as a
-            bad fit.
+        simulate: Parameters -> abscissae and ordinates, in the order of time; the same on all ranks.  A `StepError`
+            counts as a bad fit.
         guess: First guess of each parameter, none zero: it also sets the scale.
-        x: Measured abscissae, within those of every simulation.
+        x: Measured abscissae in the order of time, each leg within that of every simulation.  They turn back where they
+            go back by more than a hundredth of their range; less is noise.
         y: Measured ordinates.
         method: "gradient" is a trust-region method with one-sided finite differences, whose simulations run at once;
             "simplex" is that of Nelder and Mead, without derivatives, for curves that are rough in the parameters.
@@ -123,7 +130,7 @@ def fit_simulation(
 
     Raises:
         ValueError: An option or guess is outside its range, there are too few data, a simulation does not reach over
-            the measured abscissae, or the curve does not depend on a parameter.
+            the measured abscissae or turns back more or less often, or the curve does not depend on a parameter.
     """
     x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     require_pairs("x", x, "y", y)
@@ -161,6 +168,8 @@ class _Problem:
         progress: Progress,
     ) -> None:  # fmt: skip
         self._known, self._names, self._x, self._y, self._progress = known, list(guess), x, y, progress
+        self._noise = _NOISE * float(np.ptp(x))
+        self._legs = _legs(x, self._noise)
         self.start = np.array(list(guess.values()))
         self.scale = np.abs(self.start)
         self.limits = limits_of(guess, bounds)
@@ -190,10 +199,35 @@ class _Problem:
         if curve is None:
             return np.full(len(self._y), _FAILURE * np.abs(self._y).max())
         x, y = curve
-        reach = (float(x[0]), float(x[-1]))
-        covered = reach[0] <= self._x.min() and self._x.max() <= reach[1]
-        require("range of the simulation", reach, bool(covered), f"at least ({self._x.min()}, {self._x.max()})")
-        return np.interp(self._x, x, y) - self._y
+        simulated = _legs(x, 0.0)
+        turns = [float(self._x[leg.start]) for leg in self._legs[1:]]
+        where = f" (at {', '.join(f'{turn:.4g}' for turn in turns)}; sort the points if they are of one leg)"
+        wanted = f"{len(turns)}, as often as x turns back{where if turns else ''}"
+        require("turns of the simulation", len(simulated) - 1, len(simulated) == len(self._legs), wanted)
+        parts = [slice(max(part.start - 1, 0), part.stop) for part in simulated]  # both legs have the turn
+        values = [self._on(self._x[leg], x[part], y[part]) for leg, part in zip(self._legs, parts, strict=True)]
+        return np.concatenate(values) - self._y
+
+    def _on(self, measured: Vector, x: Vector, y: Vector) -> Vector:
+        """Ordinates of a leg of the simulation at measured abscissae; where it turns back, noise may lie beyond."""
+        x, y = (x, y) if x[-1] >= x[0] else (x[::-1], y[::-1])
+        reach, beyond = (float(x[0]), float(x[-1])), self._noise if len(self._legs) > 1 else 0.0
+        covered = reach[0] - beyond <= measured.min() and measured.max() <= reach[1] + beyond
+        require("range of the simulation", reach, bool(covered), f"at least ({measured.min()}, {measured.max()})")
+        return np.interp(measured, x, y)
+
+
+def _legs(x: Vector, noise: float) -> list[slice]:
+    """The parts of a way between its turns; a way back of no more than the noise is none."""
+    turns, direction, furthest = [0], 0.0, 0
+    for i, place in enumerate(x):
+        way = place - x[furthest]
+        if way * direction > 0 or (direction == 0 and abs(way) > noise):
+            direction, furthest = direction or float(np.sign(way)), i
+        elif abs(way) > noise and way * direction < 0:
+            turns.append(furthest + 1)
+            direction, furthest = -direction, i
+    return [slice(a, b) for a, b in pairwise([*turns, len(x)])]
 
 
 def _by_gradient(problem: _Problem, tolerance: float, evaluations: int) -> Vector:

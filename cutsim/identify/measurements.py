@@ -1,11 +1,14 @@
-"""Tables of a testing machine: columns by name, in the units of the run, refused with line and column."""
+"""Tables of a testing machine: columns by name, in the units of the run, refused with file, line and cell."""
 
 from __future__ import annotations
 
+import codecs
 import csv
+import re
 from collections.abc import Mapping, Sequence
-from math import isfinite
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pint
@@ -21,7 +24,36 @@ _POWERS = {
     "[time]": (0, 0, 1, 0),
     "[temperature]": (0, 0, 0, 1),
 }
+_ALLOWED = "a unit such as mm, kN, MPa, min, degC, % or 1"
+#: Dimension of the quantities whose name says what they are.
+_DIMENSIONS = {
+    "force": "[force]", "load": "[force]", "stress": "[pressure]", "time": "[time]", "temperature": "[temperature]",
+    "energy": "[energy]", "work": "[energy]", "toughness": "[force]/[length]", "area": "[area]",
+    "velocity": "[velocity]", "strain": "[]", "stretch": "[]", "angle": "[]", "length": "[length]",
+    "displacement": "[length]", "extension": "[length]", "travel": "[length]", "depth": "[length]",
+    "opening": "[length]",
+}  # fmt: skip
+#: Marks at the start of a file that say how it is encoded.
+_MARKS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+_DELIMITERS = (";", "\t", ",", " ")
+#: What may stand between thousands whatever the decimal sign: spaces, narrow and unbreakable ones too, apostrophes.
+_BETWEEN = " \u00a0\u202f\u2009'\u2019"
+_NO_UNIT = ("", "-", "–", "1")
 Line = tuple[int, list[str]]
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Cells of a column as written, with what messages say of them."""
+
+    path: Path | str
+    title: str
+    lines: Sequence[int]
+    cells: Sequence[str]
+
+    def require(self, i: int, valid: bool, allowed: str) -> None:
+        """Refuse a cell."""
+        require(f"{self.path}, line {self.lines[i]}, column {self.title!r}", self.cells[i], bool(valid), allowed)
 
 
 def read_table(
@@ -30,42 +62,52 @@ def read_table(
     *,
     units: Units | None = None,
     increasing: str | None = None,
-    delimiter: str = ",",
-    decimal: str = ".",
+    delimiter: str | None = None,
+    decimal: Literal[".", ","] | None = None,
     skip: int = 0,
 ) -> dict[str, NDArray[np.float64]]:
-    """Read columns of a text file with one header line. Every rank reads the file.
+    """Read columns of a text file in UTF-8, UTF-16 with a byte-order mark, or Windows-1252. Every rank reads the file.
+
+    The header is the first line that has all the columns; what is above it does not count.  A line of units may follow
+    it, and has to agree with those given.  Thousands may be separated: "1.234,5" with a decimal comma is 1234.5, and so
+    is "1,234.5" with a point.
 
     Args:
         path: The file; empty lines in it do not count.
         columns: Name of each quantity -> text in the header and unit of the numbers, such as
-            ``{"force": ("Standard force", "kN"), "strain": ("Strain", "%")}``.
+            ``{"force": ("Standard force", "kN"), "strain": ("Strain", "%")}``.  Where the name says what the quantity
+            is (force, stress, strain, time, travel, …) the unit has to be one of that.
         units: Units of the result; mm, N, s, K by default.
         increasing: Quantity that must grow from line to line, such as the depth of a cut.
-        delimiter: What separates cells.
-        decimal: Decimal point, or comma.
-        skip: Lines before the header.
+        delimiter: What separates cells, a space standing for any number of them; by default the semicolon, tab, comma
+            or space with which the columns are found.
+        decimal: Decimal point, or comma; by default what the numbers show.
+        skip: Lines above the header that are not looked at.
 
     Returns:
         Quantity -> values, one per line.
 
     Raises:
-        ValueError: A column is missing, a unit is unknown, a cell is not a finite number, the quantity does not grow,
-            or there are fewer than two lines; the message names file, line and column.
+        ValueError: A column is missing, a unit is unknown or of another quantity, a cell is not a finite number, the
+            numbers do not show their decimal sign, the quantity does not grow, there are fewer than two lines, or the
+            file is no text; the message names the file, the line, the column and the cell as written.
         OSError: The file cannot be read.
     """
     require("increasing", increasing, increasing is None or increasing in columns, f"one of {', '.join(columns)}")
-    header, rows = _lines(Path(path), delimiter, skip)
-    table: dict[str, NDArray[np.float64]] = {}
     for quantity, (title, unit) in columns.items():
-        require(f"columns of {path}", header, header.count(title) == 1, f"such that one of them is {title!r}")
-        place = header.index(title)
-        cells = [(line, cells[place].strip() if place < len(cells) else "") for line, cells in rows]
-        values = [_number(path, line, title, cell.replace(decimal, ".")) for line, cell in cells]
+        _check_unit(f"{path}, unit of column {title!r}", quantity, unit)
+    found, delimiter = _columns(path, [title for title, _ in columns.values()], delimiter, skip)
+    found = _without_units(found, [unit for _, unit in columns.values()])
+    sign = decimal or _decimal(found, delimiter)
+    table: dict[str, NDArray[np.float64]] = {}
+    for column, (quantity, (_, unit)) in zip(found, columns.items(), strict=True):
+        values = np.array([_number(cell, sign) for cell in column.cells])
+        for i in np.flatnonzero(np.isnan(values)).tolist():
+            column.require(i, False, f"a finite number with a decimal {'comma' if sign == ',' else 'point'}")
         if quantity == increasing:
-            for (line, cell), falls in zip(cells[1:], np.diff(values) <= 0, strict=True):
-                require(f"{path}, line {line}, column {title!r}", cell, not falls, "greater than in the line before")
-        table[quantity] = converted(values, unit, units or Units(), f"unit of column {title!r}")
+            for i in (np.flatnonzero(np.diff(values) <= 0) + 1).tolist():
+                column.require(i, False, "greater than in the line before")
+        table[quantity] = converted(values, unit, units or Units(), f"{path}, unit of column {column.title!r}")
     return table
 
 
@@ -81,35 +123,146 @@ def converted(values: ArrayLike, unit: str, units: Units, name: str = "unit") ->
     Raises:
         ValueError: The unit is unknown, or not made of length, force, time and temperature.
     """
-    registry = pint.get_application_registry()
-    allowed = "a unit such as mm, kN, MPa, min, degC, % or 1"
-    try:
-        quantity = registry.Quantity(np.asarray(values, dtype=np.float64), unit)
-        dimensions = dict(quantity.dimensionality)
-    except (pint.PintError, AttributeError, TypeError, ValueError):
-        require(name, unit, False, allowed)
-    require(name, unit, set(dimensions) <= set(_POWERS), allowed)
-    exponents = sum((np.array(_POWERS[d]) * p for d, p in dimensions.items()), np.zeros(4))
+    quantity = _quantity(np.asarray(values, dtype=np.float64), unit)
+    require(name, unit, quantity is not None, _ALLOWED)
+    assert quantity is not None
+    exponents = sum((np.array(_POWERS[d]) * p for d, p in quantity.dimensionality.items()), np.zeros(4))
     base = (units.length, units.force, units.time, units.temperature)
     target = "*".join(f"{symbol}**{float(p)}" for symbol, p in zip(base, exponents, strict=True) if p)
     return np.asarray(quantity.to(target).magnitude)
 
 
-def _lines(path: Path, delimiter: str, skip: int) -> tuple[list[str], Sequence[Line]]:
-    """Header and numbered lines with something in them."""
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        for _ in range(skip):
-            next(file, None)
-        reader = csv.reader(file, delimiter=delimiter)
-        lines = [(reader.line_num + skip, cells) for cells in reader if any(cell.strip() for cell in cells)]
-    require(f"number of lines in {path}", len(lines), len(lines) >= 3, "a header and at least two lines of numbers")
-    return [title.strip() for title in lines[0][1]], lines[1:]
-
-
-def _number(path: Path | str, line: int, title: str, cell: str) -> float:
+def _quantity(values: NDArray[np.float64], unit: str) -> pint.Quantity | None:
+    """Numbers with a unit; None if that is unknown, or not made of length, force, time and temperature."""
     try:
-        value = float(cell)
-    except ValueError:
-        value = float("nan")
-    require(f"{path}, line {line}, column {title!r}", cell, isfinite(value), "a finite number")
-    return value
+        quantity = pint.get_application_registry().Quantity(values, unit)
+        return quantity if set(quantity.dimensionality) <= set(_POWERS) else None
+    except (pint.PintError, AttributeError, TypeError, ValueError):
+        return None
+
+
+def _check_unit(name: str, quantity: str, unit: str) -> None:
+    """Refuse a unit that is none of the quantity it is given for."""
+    one = _quantity(np.ones(1), unit)
+    require(name, unit, one is not None, _ALLOWED)
+    assert one is not None
+    require(name, unit, not one.check("[mass]"), "no mass; forces are in N, gf, kgf or lbf")
+    dimension = _DIMENSIONS.get(quantity)
+    require(name, unit, dimension is None or one.check(dimension), f"a unit of {quantity}")
+
+
+def _text(path: Path | str) -> str:
+    """The text of a file, by its mark; without one it is UTF-8, or else Windows-1252."""
+    data = Path(path).read_bytes()
+    marked = [encoding for mark, encoding in _MARKS.items() if data.startswith(mark)]
+    for encoding in marked or ["utf-8", "cp1252"]:
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text
+    raise ValueError(f"{path} is not allowed: it must be text in UTF-8, UTF-16 with a byte-order mark or Windows-1252")
+
+
+def _columns(path: Path | str, titles: Sequence[str], delimiter: str | None, skip: int) -> tuple[list[_Column], str]:
+    """The columns below the first line that has all titles, and the delimiter with which there is one."""
+    text = _text(path)
+    found: tuple[int, str, list[Line]] = (-1, ",", [])
+    for choice in _DELIMITERS if delimiter is None else (delimiter,):
+        lines = _cut(text, choice, skip)
+        known = [sum(title in cells for title in titles) for _, cells in lines]
+        if lines and max(known) > found[0]:
+            found = max(known), choice, lines[known.index(max(known)) :]
+    _, delimiter, lines = found
+    header = lines[0][1] if lines else []
+    for title in titles:
+        require(f"columns of {path}", header, header.count(title) == 1, f"such that one of them is {title!r}")
+    numbers, rows = [line for line, _ in lines[1:]], [cells for _, cells in lines[1:]]
+    at = [header.index(title) for title in titles]
+    cells = [[row[place] if place < len(row) else "" for row in rows] for place in at]
+    return [_Column(path, title, numbers, column) for title, column in zip(titles, cells, strict=True)], delimiter
+
+
+def _cut(text: str, delimiter: str, skip: int) -> list[Line]:
+    """Numbered lines with something in them, in cells."""
+    spaced = delimiter == " "
+    lines = (line.strip() if spaced else line for line in text.splitlines()[skip:])
+    reader = csv.reader(lines, delimiter=delimiter, skipinitialspace=spaced)
+    cut = [(reader.line_num + skip, [cell.strip() for cell in cells]) for cells in reader]
+    return [(line, cells) for line, cells in cut if any(cells)]
+
+
+def _without_units(columns: list[_Column], units: Sequence[str]) -> list[_Column]:
+    """Columns without a line of units, which has to agree with those given; at least two lines of numbers are left."""
+    lines = 1 + len(columns[0].cells)
+    written = [_bare(column.cells[0]) for column in columns] if lines > 1 else []
+    if any(unit not in _NO_UNIT for unit in written) and all(unit in _NO_UNIT or _is_unit(unit) for unit in written):
+        for column, unit, given in zip(columns, written, units, strict=True):
+            column.require(0, unit in _NO_UNIT or _same(unit, given), f"{given}, the unit that is given for it")
+        columns = [replace(column, lines=column.lines[1:], cells=column.cells[1:]) for column in columns]
+        lines -= 1
+    require(f"number of lines in {columns[0].path}", lines, lines >= 3, "a header and at least two lines of numbers")
+    return columns
+
+
+def _bare(cell: str) -> str:
+    return cell.strip("[]() ")
+
+
+def _is_unit(text: str) -> bool:
+    number = re.match(r"[+\-−]?[.,]?\d|nan|[+\-−]?inf", text.lower())
+    return number is None and _quantity(np.ones(1), text) is not None
+
+
+def _same(first: str, second: str) -> bool:
+    """Whether two units are the same, with their zero."""
+    a, b = (_quantity(np.arange(1.0, 3.0), unit) for unit in (first, second))
+    if a is None or b is None or a.dimensionality != b.dimensionality:
+        return False
+    return bool(np.allclose(a.to_base_units().magnitude, b.to_base_units().magnitude, rtol=1e-9, atol=0))
+
+
+def _decimal(columns: list[_Column], delimiter: str) -> str:
+    """The decimal sign that the numbers show, the same in all of them."""
+    if delimiter == ",":
+        return "."
+    shown: dict[str, int] = {}  # and the line that shows it
+    open_to_doubt = None
+    for column in columns:
+        for i, cell in enumerate(column.cells):
+            sign = _sign(cell)
+            if sign == "?":
+                open_to_doubt = open_to_doubt or (column, i)
+            elif sign:
+                shown.setdefault(sign, column.lines[i])
+                column.require(i, len(shown) == 1, f"of the decimal sign of line {next(iter(shown.values()))}")
+    if not shown and open_to_doubt:
+        column, i = open_to_doubt
+        column.require(i, False, "a number that can be read in one way only; say which by decimal='.' or decimal=','")
+    return next(iter(shown), ".")
+
+
+def _sign(cell: str) -> str:
+    """Decimal sign of a number as written: a sign, nothing if it has none, "?" if it may be one of thousands."""
+    signs = [sign for sign in cell if sign in ".,"]
+    if not signs:
+        return ""
+    if len(set(signs)) == 2:
+        return signs[-1]
+    if len(signs) > 1:
+        return "," if signs[0] == "." else "."
+    return "?" if re.fullmatch(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", cell) else signs[0]
+
+
+def _number(cell: str, decimal: str) -> float:
+    """A number as written, nan if it is none."""
+    thousands = re.escape(_BETWEEN + (",." if decimal == "." else ".,").replace(decimal, ""))
+    whole = rf"(?:\d+|[1-9]\d{{0,2}}(?:([{thousands}])\d{{3}})(?:\1\d{{3}})*)"
+    pattern = rf"[+-]?(?:{whole}(?:{re.escape(decimal)}\d*)?|{re.escape(decimal)}\d+)(?:[eE][+-]?\d+)?"
+    cell = cell.replace("−", "-")
+    if not re.fullmatch(pattern, cell):
+        return float("nan")
+    plain = re.sub(f"[{thousands}]", "", cell).replace(decimal, ".")
+    value = float(plain)
+    return value if np.isfinite(value) else float("nan")

@@ -46,25 +46,25 @@ class Response:
         require("number of stretches", counts, sum(counts) > 0, "at least one")
         self._stretch = np.concatenate(parts)
         require("smallest stretch", self._stretch.min(), bool(np.all(self._stretch > 0)), "> 0")
-        powers = np.repeat([PATHS[path] for path, _ in tests], counts)
+        self._powers = np.repeat([PATHS[path] for path, _ in tests], counts)
         self._free = np.repeat([path == "uniaxial" for path, _ in tests], counts)
         # a cell for each stretch
         self._mesh = mesh.create_unit_interval(MPI.COMM_SELF, sum(counts))
         space = fem.functionspace(self._mesh, ("DG", 0))
         self._cells, self._dofs = np.arange(sum(counts), dtype=np.int32), space.dofmap.list[:, 0]
         self._first, self._second = fem.Function(space), fem.Function(space)
-        self._first.x.array[self._dofs] = np.log(self._stretch)
-        self._guess = powers * np.log(self._stretch)
         self._constants = form_constants(self._mesh, material)
         self._values = expression(self._derivatives(material), np.array([[0.5]]), self._mesh)
 
-    def stress(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+    def stress(self, values: Mapping[str, float], stretch: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
         """Nominal stress P₁ [stress], one for each stretch.
 
         Args:
             values: Numbers of the material by name (`cutsim.base.parameters.numbers`); the others stay.
+            stretch: As many other stretches > 0.
         """
-        return self._evaluate(values)[:, 0] / self._stretch
+        stretch = self._stretch if stretch is None else stretch
+        return self._evaluate(values, stretch)[:, 0] / stretch
 
     def modulus(self, values: Mapping[str, float]) -> NDArray[np.float64]:
         """Smallest eigenvalue of ∂²W/∂eᵢ∂eⱼ [stress]; Drucker's criterion wants it to be positive.
@@ -72,7 +72,7 @@ class Response:
         Args:
             values: Numbers of the material by name; the others stay.
         """
-        _, _, a, c, b = self._evaluate(values).T
+        _, _, a, c, b = self._evaluate(values, self._stretch).T
         return 0.5 * (a + b) - np.hypot(0.5 * (a - b), c)
 
     def _derivatives(self, material: Material) -> ufl.core.expr.Expr:
@@ -83,12 +83,13 @@ class Response:
         one, two = ufl.diff(W, first), ufl.diff(W, second)
         return ufl.as_vector([one, two, ufl.diff(one, first), ufl.diff(one, second), ufl.diff(two, second)])
 
-    def _evaluate(self, values: Mapping[str, float]) -> NDArray[np.float64]:
+    def _evaluate(self, values: Mapping[str, float], stretch: NDArray[np.float64]) -> NDArray[np.float64]:
         """First and second derivatives of W, with λ₂ such that its faces are free in uniaxial tension."""
         for name, value in values.items():
             require("parameter", name, name in self._constants, "one of " + ", ".join(self._constants))
             self._constants[name].value = value
-        second = self._guess.copy()
+        self._first.x.array[self._dofs] = np.log(stretch)
+        second = self._powers * np.log(stretch)
         for _ in range(_ITERATIONS):
             self._second.x.array[self._dofs] = second
             derivatives = evaluate(self._values, self._mesh, self._cells)
