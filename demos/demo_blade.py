@@ -37,7 +37,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim import AdiabaticTool, Blade, Exponential, NeoHookean, StepControl, TaggedMesh, read_geo, run
-from cutsim.results.output import interpolate, write_summary
+from cutsim.results.output import claim_folder, interpolate
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
@@ -110,34 +110,43 @@ def main(
     depth: Annotated[float | None, typer.Option(help="depth of the cut in mm")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/blade"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Push a rigid wedge blade through silicone and recover the fracture energy from the force."""
     level = logging.WARNING if MPI.COMM_WORLD.rank == 0 else logging.ERROR
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
+    claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
     given = SETTINGS[dim, quick]
     setting = replace(given, toughness=toughness or given.toughness, depth=depth or given.depth)
     domain = read_geo(MESH, MPI.COMM_WORLD, setting.mesh, gdim=dim)
     values = friction or [0.0]
-    curves = []
-    for mu in values:
-        folder = out if len(values) == 1 else out / f"mu_{mu:g}"
-        history, summary = push(domain, setting, SILICONES[material], mu, folder, heat)
-        curves.append(Curve(history["depth"], history["force"], f"μ = {mu:g}"))
-        check(summary, mu, steady=dim == 2 and not quick and not mu)
-    if len(values) > 1 and MPI.COMM_WORLD.rank == 0:
-        plot_curves(
-            out / "friction.png",
-            [replace(c, style=("-", "--")[i // 4 % 2]) for i, c in enumerate(curves)],
-            xlabel="depth of the tip [mm]",
-            ylabel="force on the blade [N]" if dim == 3 else "force per width [N/mm]",
-            title="Blade cutting of silicone with friction",
-        )
+    curves: list[Curve] = []
+    try:
+        for mu in values:
+            folder = out if len(values) == 1 else out / f"mu_{mu:g}"
+            summary = push(domain, setting, SILICONES[material], mu, folder, heat, curves)
+            check(summary, mu, steady=dim == 2 and not quick and not mu)
+    finally:  # also what an interrupted sweep has come to
+        if len(values) > 1 and MPI.COMM_WORLD.rank == 0:
+            plot_curves(
+                out / "friction.png",
+                [replace(c, style=("-", "--")[i // 4 % 2]) for i, c in enumerate(curves)],
+                xlabel="depth of the tip [mm]",
+                ylabel="force on the blade [N]" if dim == 3 else "force per width [N/mm]",
+                title="Blade cutting of silicone with friction",
+            )
 
 
 def push(
-    domain: TaggedMesh, setting: Setting, silicone: tuple[float, float, float], friction: float, out: Path, heat: bool
-) -> tuple[History, Summary]:
-    """One cut: run it, draw it, sum it up."""
+    domain: TaggedMesh,
+    setting: Setting,
+    silicone: tuple[float, float, float],
+    friction: float,
+    out: Path,
+    heat: bool,
+    curves: list[Curve],
+) -> Summary:
+    """One cut: run it, add its curve to the others, draw it, sum it up."""
     begun = time.perf_counter()
     young, poisson, strength = silicone
     dim = domain.mesh.geometry.dim
@@ -164,14 +173,16 @@ def push(
         extra=cut.columns,
         derived={"cauchy_stress": cut.solid.cauchy_stress(cut.state.u)},
     ) as recording:
-        run(problem, until, control, recording)
+        try:
+            run(problem, until, control, recording)
+        finally:
+            depth, force = (recording.history.get(name, []) for name in ("depth", "force"))
+            curves.append(Curve(depth, force, f"μ = {friction:g}", partial=not recording.complete))
     history = recording.columns()
     draw(cut, history, law, out, problem.fields.get("temperature"))
-    if history["time"][-1] < until:
-        raise typer.Exit(1)  # interrupted: what was recorded stays
     summary = summarise(cut, history, law, time.perf_counter() - begun)
-    write_summary(out / "summary.json", summary, MPI.COMM_WORLD)
-    return history, summary
+    recording.summary(summary)
+    return summary
 
 
 # ## What came out

@@ -61,7 +61,7 @@ from cutsim import (
     run,
 )
 from cutsim.base.compat import evaluate, expression
-from cutsim.results.output import write_summary
+from cutsim.results.output import claim_folder
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Columns, Recording
@@ -340,10 +340,12 @@ def main(
     steps: Annotated[int | None, typer.Option(min=1, help="steps of the whole path")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="a shorter run")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/dcb"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Open a double cantilever beam and compare force and dissipation with beam theory."""
     level = logging.WARNING if MPI.COMM_WORLD.rank == 0 else logging.ERROR
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
+    claim_folder(out, COMM, overwrite=overwrite)
     specimen = (QUICK if quick else FULL)[case]
     if steps is not None:
         specimen = replace(specimen, step=specimen.turns[-1] / steps)
@@ -360,13 +362,11 @@ def main(
         run(beam.mechanics, specimen.turns[-1], control(specimen), recording)
     draw(beam, recording, out, f"Double cantilever beam, {case}, {dim}-D")
     history = recording.columns()
-    if history["time"][-1] < specimen.turns[-1]:
-        raise typer.Exit(1)  # interrupted: what was recorded stays
     result = growth(specimen, history, specimen.width / beam.share)
     if case is Case.thesis:
         result |= secants(specimen, history)
     result |= {"steps": len(history["step"]), "newton": int(history["newton"].sum())}
-    write_summary(out / "summary.json", {"case": case, "dim": dim, **result}, COMM)
+    recording.summary({"case": case, "dim": dim, **result})
     if COMM.rank == 0:
         for name, value in result.items():
             print(f"{name:>24} {value:.6g}")

@@ -104,7 +104,7 @@ from cutsim import (
 )
 from cutsim.base.kinematics import displacement_jump
 from cutsim.base.units import Units
-from cutsim.results.output import interpolate, write_summary
+from cutsim.results.output import claim_folder, interpolate, write_summary
 from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Columns, Recording
@@ -379,8 +379,6 @@ def rub(pair: Pair, name: str, out: Path) -> tuple[Rubbing, dict[str, NDArray[np
     ):
         run(problem, until, pair.control, recording)
     history = recording.columns()
-    if history["time"][-1] < until:
-        raise typer.Exit(1)  # interrupted: what was recorded stays
     return rubbing, history
 
 
@@ -532,10 +530,12 @@ def check(results: dict[str, dict[str, float]]) -> None:
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="coarser, with fewer strokes")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/frictional_heating"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Rub a block on a slab and compare the heat with closed forms."""
     level = logging.WARNING if COMM.rank == 0 else logging.ERROR
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
+    claim_folder(out, COMM, overwrite=overwrite)
     results = {}
     for name, pair in pairs(quick=quick).items():
         rubbing, history = rub(pair, name, out / name)

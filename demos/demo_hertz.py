@@ -65,7 +65,7 @@ from cutsim import (
 from cutsim import Path as ToolPath
 from cutsim.base.compat import geometry_nodes, nodal_expression
 from cutsim.fields.points import FacetPoints, Surface, Values
-from cutsim.results.output import write_summary
+from cutsim.results.output import claim_folder, write_summary
 from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Columns, Recording
@@ -467,10 +467,12 @@ def check(results: dict[str, dict[str, float]], *, quick: bool) -> None:
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="coarser, in fewer steps")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/hertz"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Press balls and cylinders on each other: a rigid ball, two bodies, two cylinders that are drawn sideways."""
     level = logging.WARNING if COMM.rank == 0 else logging.ERROR
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
+    claim_folder(out, COMM, overwrite=overwrite)
     specimen = QUICK if quick else FULL
     meshes = {"rigid": (2, 3) if quick else (2, 3, 4, 6), "elastic": (2,) if quick else (2, 3, 4)}
     results: dict[str, dict[str, float]] = {}

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from cutsim import Coulomb, Mechanics, NeoHookean, Solid, State, StepControl, Support, SurfacePair, read_geo, run
 from cutsim.base.compat import nodal_expression
-from cutsim.results.output import write_summary
+from cutsim.results.output import claim_folder, write_summary
 from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Columns, Recording
@@ -142,8 +142,6 @@ def iron(ironing: Ironing, out: Path) -> dict[str, Array]:
         run(bodies.mechanics, ironing.until, CONTROL, recording)
     draw(bodies, out / "body.png", f"Ironing, {title}")
     history = recording.columns()
-    if history["time"][-1] < ironing.until:
-        raise typer.Exit(1)  # interrupted: what was recorded stays
     return history
 
 
@@ -233,10 +231,12 @@ def check(results: dict[str, dict[str, float]], sizes: tuple[float, ...]) -> Non
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="without the finest mesh, a shorter way")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/ironing"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Press a die into a slab, draw it along, and see how smooth the forces are."""
     level = logging.WARNING if COMM.rank == 0 else logging.ERROR
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
+    claim_folder(out, COMM, overwrite=overwrite)
     sizes, results = SIZES[:2] if quick else SIZES, {}
     for mu in FRICTIONS:
         histories = {}

@@ -25,7 +25,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim import Exponential, Needle, NeoHookean, StepControl, read_geo, run
-from cutsim.results.output import interpolate, write_summary
+from cutsim.results.output import claim_folder, interpolate
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism, revolved
 from cutsim.results.plots import Curve, plot_curves, plot_energy, plot_parts
 from cutsim.results.recording import Recording
@@ -83,10 +83,12 @@ def main(
     depth: Annotated[float | None, typer.Option(help="depth of the tip in mm")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/needle_insertion"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Push a needle into silicone and say what its force is made of."""
     level = logging.WARNING if MPI.COMM_WORLD.rank == 0 else logging.ERROR
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
+    claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
     begun = time.perf_counter()
     setting = SETTINGS[dim, quick]
     end = depth or setting.depth
@@ -107,11 +109,9 @@ def main(
         run(cut.mechanics, until, control, recording)
     history = recording.columns()
     draw(cut, out)
-    if history["time"][-1] < until:
-        raise typer.Exit(1)  # interrupted: what was recorded stays
     parts = force_parts(history, cut.whole, setting.window)
     summary = summarise(cut, history, parts, law, time.perf_counter() - begun)
-    write_summary(out / "summary.json", summary, MPI.COMM_WORLD)
+    recording.summary(summary)
     if MPI.COMM_WORLD.rank == 0:
         plot(out, cut, history, parts)
     check(summary, long=dim == 2 or not quick)

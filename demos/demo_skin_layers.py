@@ -40,7 +40,7 @@ from mpi4py import MPI
 
 from cutsim import Blade, Exponential, LayeredBlock, StepControl, laminate, run
 from cutsim.base.compat import nodal_expression
-from cutsim.results.output import write_summary
+from cutsim.results.output import claim_folder
 from cutsim.results.pictures import draw_body, gather_grid, prism
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
@@ -89,19 +89,20 @@ def main(
     stretch: Annotated[float, typer.Option(min=0.0, help="stretch of the skin before the cut")] = STRETCH,
     quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/skin_layers"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Cut through the eight layers of skin."""
     begun = time.perf_counter()
     logging.basicConfig(level=logging.WARNING if COMM.rank == 0 else logging.ERROR, format="%(name)s: %(message)s")
+    claim_folder(out, COMM, overwrite=overwrite)
     setting = SETTINGS[quick]
     cut = build(setting, stretch)
     until = cut.time_of(depth or setting.depth)
-    history = push(cut, until, setting.size, out)
+    recording = push(cut, until, setting.size, out)
+    history = recording.columns()
     draw(cut, history, out)
-    if history["time"][-1] < until:
-        raise typer.Exit(1)  # interrupted: what was recorded stays
     summary = summarise(cut, history, time.perf_counter() - begun)
-    write_summary(out / "summary.json", summary, COMM)
+    recording.summary(summary)
     check(cut, summary, history)
 
 
@@ -116,7 +117,7 @@ def build(setting: Setting, stretch: float) -> LayeredCut:
     return LayeredCut.build(block, blade, notch=setting.notch, drawn=stretch * LENGTH)
 
 
-def push(cut: LayeredCut, until: float, size: float, out: Path) -> History:
+def push(cut: LayeredCut, until: float, size: float, out: Path) -> Recording:
     """Insert and push the blade. Collective."""
     with Recording(
         out,
@@ -130,7 +131,7 @@ def push(cut: LayeredCut, until: float, size: float, out: Path) -> History:
         insertion = StepControl(first=0.05, largest=0.1, smallest=1e-5)
         run(cut.mechanics, cut.insertion, insertion, recording)
         run(cut.mechanics, until, StepControl(first=size / 4, largest=size, smallest=1e-5), recording)
-    return recording.columns()
+    return recording
 
 
 # ## What came out

@@ -39,6 +39,11 @@ if __name__ == "__main__":
         if end.code:
             end_together(comm)
             sys.exit(end.code if isinstance(end.code, int) else 1)
+    except KeyboardInterrupt as end:
+        if comm.rank == 0:
+            print(f"{type(end).__name__}: {end}", file=sys.stderr)
+        end_together(comm)
+        sys.exit(130)
     except BaseException:
         traceback.print_exc()
         end_together(comm)

@@ -28,9 +28,15 @@ BILINEAR = Bilinear(penalty=200.0, t_n=2.0, G_I=0.2, t_t=3.0, G_II=0.5, eta=1.7)
 PPR = ParkPaulinoRoesler(t_n=2.0, G_I=0.2, t_t=3.0, G_II=0.5, alpha=3.0, beta=2.2, peak_n=0.15, peak_t=0.2)
 
 
-@pytest.fixture(autouse=True, scope="module")
+def pytest_collection_finish():
+    """What is imported stays: collections during the run need not look at it again."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture(autouse=True)
 def _nothing_is_left():
-    """What a module has dropped is freed before the next one: MPICH has some two thousand communicators a process."""
+    """What a test has dropped is freed before the next one: MPICH has some two thousand communicators a process."""
     yield
     gc.collect()
 

@@ -59,7 +59,7 @@ def drive(cut, until, control):
 @cache
 def needle_twice(friction):
     cut = thread(friction=friction, turn=1.7)
-    return cut, drive(cut, cut.time_of(1.7, 2), StepControl(first=0.02, largest=0.1))
+    return cut, drive(cut, cut.time_of(1.7, 2), StepControl(first=0.02, largest=0.05))
 
 
 @cache

@@ -148,6 +148,17 @@ def test_a_failing_picture_is_a_warning(folder, caplog, monkeypatch):
     assert ("no pictures" in caplog.text) == (MPI.COMM_WORLD.rank == 0)
 
 
+def test_a_curve_that_ends_early_says_so(tmp_path, monkeypatch):
+    seen = []
+    monkeypatch.setattr(plots, "_save", lambda figure, path: seen.append(figure))
+    curves = [Curve([0, 1], [0, 2], "whole"), Curve([0, 1, 2], [0, 1, 3], "cut off", partial=True)]
+    plot_curves(tmp_path / "a.png", curves, xlabel="x", ylabel="y")
+    axes = seen[0].axes[0]
+    assert [t.get_text() for t in axes.get_legend().get_texts()] == ["whole", "cut off (ends early)"]
+    (cross,) = [line for line in axes.lines if line.get_marker() == "x"]
+    assert cross.get_xydata().tolist() == [[2, 3]] and cross.get_color() == axes.lines[1].get_color()
+
+
 def test_curves_and_energy_are_plotted(tmp_path):
     x = np.linspace(0, 1, 20)
     plot_curves(

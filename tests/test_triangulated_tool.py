@@ -163,12 +163,12 @@ def test_energy_closes_with_the_steps():
 def test_energy_of_friction_closes_with_the_penalty():
     """Friction acts at the surface of the body, a penetration away from that of the tool, which is curved."""
     closures = []
-    for stiffness in (60.0, 960.0):
+    for stiffness in (60.0, 3840.0):
         mechanics = indented(2, ball(2, 5), drawn(2, 0.1, 0.2), 8, contact=PenaltyContact(stiffness))[0]
-        rows = history(mechanics, 2.0, StepControl(0.125, 0.125, line_searches=LINE_SEARCHES))
+        rows = history(mechanics, 2.0, StepControl.fixed(1 / 32))
         closures.append(abs(rows["energy_closure"][-1]))
         assert (np.diff(rows["energy_friction"]) > -1e-12).all() and rows["energy_friction"][-1] > 3e-3
-    assert closures[0] > 5 * closures[1] and closures[1] < 2e-3, closures
+    assert closures[0] > 10 * closures[1] and closures[1] < 1e-3, closures
 
 
 @pytest.mark.parametrize(("gdim", "n"), [(2, 12), (3, 8)])

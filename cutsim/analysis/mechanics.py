@@ -19,6 +19,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
+from cutsim.base.verdict import CLOSURE
 from cutsim.bodies.constraints import Constraints
 from cutsim.bodies.inertia import Inertia
 from cutsim.bodies.loads import Load, Support
@@ -34,6 +35,8 @@ logger = collective_logger(__name__)
 
 # displacement over the size of the mesh at which a solve is given up
 _RUNAWAY = 100.0
+#: What a viscosity may take of the energy that is lost.
+VISCOUS = 0.01
 #: Uzawa augmentations allowed in one step.
 AUGMENTATIONS = 30
 
@@ -159,6 +162,11 @@ class Mechanics:
         if self.inertia is not None:
             self.problem.known[:] = self.inertia.history(self._residual_old)
 
+    def predict(self) -> None:
+        """Start the search for equilibrium where the last step leads; with inertia the velocity does so already."""
+        if self.inertia is None:
+            self.state.predict()
+
     def _take_over(self) -> None:
         """Forces and energies of a static state that others have loaded, or that was set."""
         u = self.state.u_old.x.array
@@ -226,6 +234,27 @@ class Mechanics:
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
         return max(t.damage_increment() for t in self.terms)
+
+    def watch(self) -> None:
+        """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
+        for term in self.terms:
+            term.watch()
+        self._watch_books()
+
+    def _watch_books(self) -> None:
+        """Doubt books that do not close, and a viscosity that takes part in what is lost."""
+        verdict, closure, entries = self.state.verdict, abs(self._trial_audit.closure), self._trial_audit.entries
+        if closure > CLOSURE:
+            verdict.doubt(
+                "closure", f"{closure:.1%} of the energy is missing in the audit: smaller steps are needed", closure
+            )
+        lost = entries["fracture"] + entries["friction"]
+        viscous = sum(t.viscous_work for t in self.terms if isinstance(t, Solid))
+        verdict.withdraw("viscosity")
+        if lost > 0 and viscous > VISCOUS * (lost + viscous):
+            # before anything breaks it is all of it: what counts is how much it is in the end
+            share = viscous / (lost + viscous)
+            verdict.suppose("viscosity", f"the viscosity takes {share:.1%} of the energy that is lost")
 
     def diagnose(self) -> str:
         """After a failed solve: what is wrong and where, in words. Collective."""

@@ -79,6 +79,10 @@ class ThermoMechanics:
         """Start a trial step that ends at `time`."""
         self.mechanics.begin(time)
 
+    def predict(self) -> None:
+        """Start the search for equilibrium from where the last step leads."""
+        self.mechanics.predict()
+
     def solve(self, line_search: str | None = None) -> Outcome:
         """Find equilibrium and temperature. Collective.
 
@@ -120,6 +124,11 @@ class ThermoMechanics:
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
         return self.mechanics.damage_increment()
+
+    def watch(self) -> None:
+        """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
+        self.mechanics.watch()
+        self.heat.watch()
 
     def diagnose(self) -> str:
         """After a failed solve: what is wrong and where, in words. Collective."""

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import isfinite
 from types import FrameType
-from typing import Protocol
+from typing import Literal, Protocol
 
 from mpi4py import MPI
 
@@ -26,6 +26,8 @@ logger = collective_logger(__name__)
 
 # a step that would leave less than this fraction of itself before a corner is stretched to meet it
 _SLIVER = 0.1
+# change of the audit's relative closure at which a predicted step is thought to have strayed to another equilibrium
+_STRAYED = 1e-3
 # corners that differ by less than this fraction of the smallest step are one
 _ROUNDING = 1e-6
 
@@ -76,6 +78,9 @@ class Problem(Protocol):
     def begin(self, time: float) -> None:
         """Start a trial step that ends at `time`."""
 
+    def predict(self) -> None:
+        """Start the search for the trial state from where the last step leads."""
+
     def solve(self, line_search: str | None = None) -> Outcome:
         """Solve the trial step. Collective."""
 
@@ -84,6 +89,9 @@ class Problem(Protocol):
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
+
+    def watch(self) -> None:
+        """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
 
     def diagnose(self) -> str:
         """After a failed solve: what is wrong and where, in words. Collective."""
@@ -116,7 +124,8 @@ class StepControl:
         easy: Newton iterations up to which a step counts as easy.
         damage: Largest growth of damage at a point in a step, in (0, 1]; None for no limit.
         closure: Largest change of the energy audit's relative closure in a step; None for no limit.
-        line_searches: Line searches tried in turn for the same step.
+        line_searches: Line searches tried in turn for the same step. For tools the default is best; for cracks in
+            stiff, slender bodies ("basic", "l2", "bt").
 
     Raises:
         ValueError: A value is outside its range.
@@ -130,7 +139,7 @@ class StepControl:
     easy: int = 6
     damage: float | None = None
     closure: float | None = None
-    line_searches: tuple[str, ...] = ("l2", "bt")
+    line_searches: tuple[str, ...] = ("bt", "l2")
 
     def __post_init__(self) -> None:
         require_number("first", self.first, positive)
@@ -164,6 +173,7 @@ class StepReport:
         dt: Its size [time].
         outcome: What the solver did.
         cuts: Rejected attempts since the previous accepted step.
+        interrupted: Whether a signal ended the run after this step.
         columns: History columns, name → (value, kind of quantity).
     """
 
@@ -172,7 +182,22 @@ class StepReport:
     dt: float
     outcome: Outcome
     cuts: int
+    interrupted: bool = False
     columns: dict[str, tuple[float, str]] = field(default_factory=dict)
+
+
+class Interrupted(KeyboardInterrupt):
+    """A signal has ended a run after a step, on all ranks; what was recorded stays.
+
+    As for any Ctrl-C, ``except Exception`` lets it pass: a script does not go on as if the run were finished.
+
+    Attributes:
+        report: The last step.
+    """
+
+    def __init__(self, words: str, report: "StepReport") -> None:
+        super().__init__(words)
+        self.report = report
 
 
 Recorder = Callable[[StepReport], None]
@@ -185,10 +210,13 @@ def run(
     control: StepControl,
     record: Recorder = lambda _: None,
     stop: Callable[[StepReport], bool] = lambda _: False,
+    *,
+    interrupt: Literal["raise", "return"] = "raise",
 ) -> StepReport | None:
     """Advance to a time. Collective.
 
-    Ctrl-C and SIGTERM end the run cleanly after the current step.
+    Ctrl-C and SIGTERM end the run cleanly after the current step. What makes the result questionable is found in
+    `state.verdict` afterwards.
 
     Args:
         problem: The problem; it goes on from its committed state.
@@ -196,11 +224,13 @@ def run(
         control: Step sizes.
         record: Called on all ranks after each accepted step.
         stop: Asked on all ranks after each accepted step with reduced numbers; True ends the run.
+        interrupt: Whether a signal raises `Interrupted`, or the report of the last step is returned all the same.
 
     Returns:
         The last report, None if no step was needed.
 
     Raises:
+        Interrupted: A signal has ended the run.
         StepError: The smallest step was reached; says when, where and why.
         ValueError: `until` is not later than the committed time, or a body is free to move.
     """
@@ -209,35 +239,51 @@ def run(
     problem.check()
     corners = [c for c in (*problem.corners, until) if c <= until]
     dt, report, number = control.first, None, 0
+    smooth = False  # whether the last step tells where the next one leads
     with _interruptible(state.mesh.comm) as interrupted:
         while ahead := [c for c in corners if c > state.time_old + _ROUNDING * control.smallest]:
             corner = min(ahead)
-            report = _advance(problem, control, dt, corner)
+            report = _advance(problem, control, dt, corner, predict=smooth)
             number += 1
             report.number = number
+            report.interrupted = interrupted()
             record(report)
-            if stop(report) or interrupted():
+            if report.interrupted:
+                words = f"interrupted at time {report.time:.6g} of {until:.6g}"
+                if report.time < until:
+                    state.verdict.doubt("interrupted", words)
+                if interrupt == "raise":
+                    raise Interrupted(words, report)
                 break
-            dt = _next_step(control, report, dt, at_corner=state.time_old == corner)
+            if stop(report):
+                break
+            at_corner = state.time_old == corner
+            dt = _next_step(control, report, dt, at_corner=at_corner)
+            smooth = not at_corner and not report.cuts
+    logger.info("the run to time %.6g is %s", state.time_old, state.verdict)
     return report
 
 
-def _advance(problem: Problem, control: StepControl, dt: float, corner: float) -> StepReport:
-    """One accepted step of at most dt that does not pass the corner."""
+def _advance(problem: Problem, control: StepControl, dt: float, corner: float, *, predict: bool) -> StepReport:
+    """One accepted step of at most dt that does not pass the corner; its first try may be predicted."""
     state, cuts = problem.state, 0
     while True:
         start = state.time_old
         end = corner if start + (1 + _SLIVER) * dt >= corner else start + dt
-        outcome, refusal = _attempt(problem, control, end)
+        outcome, refusal = _attempt(problem, control, end, predict=predict and not cuts)
         if refusal is None:
             size = end - start
+            if cuts and control.cut * size < control.smallest:
+                state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
+            problem.watch()
             problem.commit()
-            return StepReport(0, end, size, outcome, cuts, problem.record())
+            return StepReport(0, end, size, outcome, cuts, columns=problem.record())
         problem.rollback()
         cuts += 1
         dt = control.cut * (end - start)
         logger.info("step to %.6g rejected (%s); next try %.3g", end, refusal, dt)
         if dt < control.smallest:
+            problem.state.verdict.doubt("ended", f"no step succeeds from time {start:.6g} on")
             raise StepError(
                 f"no step from time {start:.6g} of {dt / control.cut:.3g} or more succeeds "
                 f"(smallest = {control.smallest:.3g}): {refusal}"
@@ -245,14 +291,19 @@ def _advance(problem: Problem, control: StepControl, dt: float, corner: float) -
             )
 
 
-def _attempt(problem: Problem, control: StepControl, end: float) -> tuple[Outcome, str | None]:
+def _attempt(problem: Problem, control: StepControl, end: float, *, predict: bool) -> tuple[Outcome, str | None]:
     """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
     before = problem.audit.closure
-    for line_search in control.line_searches:
+    for retry, line_search in enumerate(control.line_searches):
         problem.rollback()
         problem.begin(end)
+        predicted = predict and not retry
+        if predicted:
+            problem.predict()
         outcome = problem.solve(line_search)
         failure = _failure(problem, outcome)
+        if predicted and failure is None and abs(problem.trial_audit.closure - before) > _STRAYED:
+            failure = "the start from the last step's rate leads to another equilibrium"
         if failure is None:
             break
     else:

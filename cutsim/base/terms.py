@@ -118,6 +118,9 @@ class Term:
         """Largest growth of damage at a point in the trial step [–]. Collective."""
         return 0.0
 
+    def watch(self) -> None:
+        """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
+
     def diagnose(self) -> str | None:
         """After a failed solve: what is wrong in this term, in words, or None. Collective."""
         return None

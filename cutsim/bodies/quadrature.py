@@ -4,11 +4,8 @@ import numpy as np
 import ufl
 from numpy.typing import NDArray
 
-from cutsim.base.log import collective_logger
 from cutsim.fields.state import State
 from cutsim.materials.elastic import Material
-
-logger = collective_logger(__name__)
 
 #: Poisson's ratio from which the volumetric part is integrated with fewer points by default.
 NEARLY_INCOMPRESSIBLE = 0.45
@@ -24,14 +21,15 @@ def strain_energy_measures(
         material: Strain energy.
         volumetric: "reduced" for fewer points in the volumetric part; "auto" does so for ν ≥ 0.45.
         cells: Local cells of the body, all by default.
-        name: The body, in the warning that a linear element locks.
+        name: The body, in the doubt that a linear element locks.
     """
     element, nearly = state.V.ufl_element(), material.poisson >= NEARLY_INCOMPRESSIBLE
     cell, degree = element.cell_type.name, element.degree
     simplex = cell in ("triangle", "tetrahedron")
     if nearly and degree == 1 and (simplex or volumetric == "full"):
         cure = "quadrilaterals, hexahedra or degree 2" if simplex else "volumetric='auto' or degree 2"
-        logger.warning("%s: a linear %s locks at Poisson's ratio %.4g; use %s", name, cell, material.poisson, cure)
+        words = f"{name}: a linear {cell} locks at Poisson's ratio {material.poisson:.4g}; use {cure}"
+        state.verdict.doubt(f"{name}: locking", words)
     reduced = volumetric == "reduced" or (volumetric == "auto" and nearly)
     # full integration: (degree + 1) points in each direction of a tensor-product cell, exact stiffness on simplices
     full = 2 * (degree - 1) if simplex else 2 * degree

@@ -27,6 +27,9 @@ from cutsim.materials.elastic import Material, volumetric_energy
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Overstress, Prony
 
+# volume ratio below which an element is no longer to be trusted
+_FLAT = 0.1
+
 
 class Solid(Term):
     """Hyperelastic body that occupies some cells.
@@ -226,6 +229,21 @@ class Solid(Term):
             strain += self._overstress.energies.stored
             viscous += self._overstress.energies.lost
         return {"strain": strain, "viscous": viscous, "thermoelastic": self._thermal}
+
+    @property
+    def viscous_work(self) -> float:
+        """Work of the Kelvin–Voigt viscosity so far, in the trial state [energy]."""
+        return self._viscous
+
+    def watch(self) -> None:
+        """Doubt elements that are almost flat. Collective."""
+        smallest = self.smallest_jacobian()
+        if smallest < _FLAT:
+            self.state.verdict.doubt(
+                f"{self.name}: J",
+                f"{self.name}: an element is squeezed to {smallest:.2g} of its volume, smaller ones are needed",
+                -smallest,
+            )
 
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""

@@ -10,6 +10,7 @@ from cutsim.base import kinematics
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.verdict import Verdict
 from cutsim.fields.cells import check_cells
 from cutsim.fields.measures import Measures
 
@@ -28,6 +29,7 @@ class State:
         time: Time at the end of the step (trial) [time].
         dt: Step size as a form constant.
         measures: Integration measures that the terms share.
+        verdict: What speaks against trusting the displacement.
 
     Raises:
         ValueError: The space is not one of vectors, cells are folded or have no volume, or the mesh is no meridian
@@ -47,14 +49,20 @@ class State:
         self.u_old = fem.Function(V, name="u_old")
         self.dt = fem.Constant(V.mesh, default_scalar_type(1.0))
         self.measures = Measures(V.mesh, axisymmetric=axisymmetric)
+        self.verdict = Verdict()
         self.time = 0.0
         self.time_old = 0.0
         self._dt_old = float(self.dt.value)
+        self._rate = np.zeros_like(self.u.x.array)
 
     def begin(self, time: float) -> None:
         """Start a step that ends at `time`; the trial displacement starts from the committed one."""
         self.time = time
         self.dt.value = time - self.time_old
+
+    def predict(self) -> None:
+        """Let the trial displacement go on at the rate of the last committed step."""
+        self.u.x.array[:] = self.u_old.x.array + float(self.dt.value) * self._rate
 
     def rollback(self) -> None:
         """Restore the committed displacement and time bit for bit."""
@@ -64,6 +72,8 @@ class State:
 
     def commit(self) -> None:
         """Adopt the trial displacement and time."""
+        if self.time > self.time_old:
+            self._rate = (self.u.x.array - self.u_old.x.array) / (self.time - self.time_old)
         self.u_old.x.array[:] = self.u.x.array
         self.time_old = self.time
         self._dt_old = float(self.dt.value)

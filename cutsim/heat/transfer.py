@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.verdict import CLOSURE
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatBalance, HeatTerm
 from cutsim.heat.conduction import HeatBody
@@ -108,6 +109,9 @@ class HeatTransfer:
         for part in self._parts:
             part.begin(time)
 
+    def predict(self) -> None:
+        """Nothing: the problem is linear, and found in one iteration from anywhere."""
+
     def solve(self, line_search: str | None = None) -> Outcome:
         """Find the temperature at the end of the step. Collective.
 
@@ -130,6 +134,12 @@ class HeatTransfer:
     def damage_increment(self) -> float:
         """Heat damages nothing."""
         return 0.0
+
+    def watch(self) -> None:
+        """Doubt books of heat that do not close. Collective."""
+        closure = abs(self._trial_audit.closure)
+        if closure > CLOSURE:
+            self.state.verdict.doubt("heat closure", f"{closure:.1%} of the heat is missing in the audit", closure)
 
     def diagnose(self) -> str:
         """After a failed solve: what is wrong and where, in words. Collective."""

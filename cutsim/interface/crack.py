@@ -18,7 +18,6 @@ from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.functions import larger
 from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
-from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
@@ -27,12 +26,11 @@ from cutsim.fields.points import FacetPoints, Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.space import crack_measure_entities
 from cutsim.fields.state import State
-from cutsim.interface.cohesive import CohesiveLaw, process_zone_element
+from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.law import Response, respond
-
-logger = collective_logger(__name__)
 
 # pressure over that of faces which look at each other that counts as none
 _ROUNDING = 1e-9
@@ -114,7 +112,8 @@ class Crack(Term):
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         self._symbolic_law = None if law is None else with_constants(state.mesh, law)
         self._symbolic_contact = with_constants(state.mesh, self.contact)
-        self._warn_coarse(young)
+        if law is not None:
+            doubt_law(state.verdict, name, law, young, self.size)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
         self.history = InterfaceHistory(self.points, law)
         self._point_values = self.points.evaluator(self._columns())
@@ -217,11 +216,19 @@ class Crack(Term):
         pressed = values["pressure"] > _ROUNDING * self.contact.stiffness * np.abs(depth)
         return max(self.points.maximum(np.where(pressed, depth, 0.0)), 0.0)
 
+    def penetration(self) -> float:
+        """Largest penetration of a pressed point over the normal mesh size. Collective."""
+        return self._penetration(self.history.trial) / self.normal_size
+
+    def watch(self) -> None:
+        """Doubt faces that lie deep in each other. Collective."""
+        doubt_penetration(self.state.verdict, self.name, self.penetration())
+
     def record(self) -> dict[str, tuple[float, str]]:
         """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
         columns = {
             f"{self.name}_opening": (self.points.maximum(self.history.trial["opening"]), "length"),
-            f"{self.name}_penetration": (self._penetration(self.history.trial) / self.normal_size, "one"),
+            f"{self.name}_penetration": (self.penetration(), "one"),
         }
         if self.law is not None:
             kind = self.state.facet_measure
@@ -254,13 +261,3 @@ class Crack(Term):
     def frame(self, u: Expr) -> tuple[Expr, ...]:
         """Unit tangents of the mid-surface that turn with it: one in 2-D, two in 3-D."""
         return surface_frame(u, self.state.mesh, self.response(u).normal, current=self._current)
-
-    def _warn_coarse(self, young: float) -> None:
-        if self.law is None:
-            return
-        allowed = process_zone_element(self.law, young)
-        if self.size > allowed:
-            logger.warning(
-                "%s: facets of %.3g do not resolve the process zone (opening %.3g): use %.3g or less",
-                self.name, self.size, self.law.opening, allowed,
-            )  # fmt: skip

@@ -57,7 +57,8 @@ class CrackFriction(Term):
         require("acts_on", acts_on, acts_on in _AREAS, f"one of {', '.join(_AREAS)}")
         require_number("stick", stick, positive.or_none)
         if acts_on == "thesis":
-            logger.warning("%s: open faces rub (friction 'thesis'); use it for comparison only", crack.name)
+            words = f"{crack.name}: open faces rub (friction 'thesis'); use it for comparison only"
+            crack.state.verdict.doubt(f"{crack.name}: friction", words)
         self.crack, self.name = crack, f"{crack.name}_friction"
         u = crack.state.u
         response, self._frame = crack.response(u), crack.frame(u)

@@ -10,6 +10,7 @@ from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
 from cutsim.pairs.kinematics import PairKinematics
 from cutsim.pairs.law import PairLaws
@@ -85,6 +86,8 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         sizes = [p.mean(facet_size(state.mesh, p.facets)) for p in points]
         self.normal_size = points[0].mean(normal_size(state.mesh, points[0].facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
+        if law is not None:
+            doubt_law(state.verdict, name, law, young, sizes[0])
         laws = PairLaws(law, self.contact, friction, penetration, stick)
         surfaces = [OuterSurface(state.V, p.facets) for p in points]
         self.facets = tuple(p.facets for p in points)
@@ -147,6 +150,10 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         """Largest penetration of a point over the normal mesh size. Collective."""
         depth = max(p.points.maximum(-p.history.trial["opening"]) for p in self.passes)
         return max(depth, 0.0) / self.normal_size
+
+    def watch(self) -> None:
+        """Doubt surfaces that lie deep in each other. Collective."""
+        doubt_penetration(self.state.verdict, self.name, self.penetration())
 
     def diagnose(self) -> str | None:
         """Say how deep the surfaces penetrate, and whether any point has a partner at all. Collective."""

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import math
 import os
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -25,6 +27,8 @@ from cutsim.base.checks import require
 from cutsim.base.units import Units
 
 _TAKEN = ("displacement", "fields")
+# bytes to be left on the disk, for what ADIOS2 writes beside the fields and when it closes its files
+_RESERVE = 4_000_000
 
 # ADIOS2, which writes the fields, looks for its settings there and does not survive if there is none
 os.environ.setdefault("HOME", str(Path.home()))
@@ -71,7 +75,7 @@ class HistoryWriter(_Closing):
         self._comm, self._names = comm, tuple(columns)
         self._file: TextIO | None = None
         header = [units.label(name, kind) for name, kind in columns.items()]
-        _on_root(comm, lambda: self._open(Path(path), header))
+        on_root(comm, lambda: self._open(Path(path), header))
 
     def append(self, row: Mapping[str, float]) -> None:
         """Write one row. Collective.
@@ -87,7 +91,7 @@ class HistoryWriter(_Closing):
         if missing or extra:
             raise ValueError(f"row lacks {sorted(missing)} and has {sorted(extra)} besides {self._names}")
         cells = [_cell(name, row[name]) for name in self._names]
-        _on_root(self._comm, lambda: self._write(cells))
+        on_root(self._comm, lambda: self._write(cells))
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
@@ -148,7 +152,31 @@ def write_summary(path: Path | str, values: Mapping[str, Any], comm: MPI.Comm) -
         draft.write_text(text + "\n", encoding="utf-8")
         os.replace(draft, target)
 
-    _on_root(comm, write)
+    on_root(comm, write)
+
+
+def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False, subfolders: bool = True) -> None:
+    """Make sure that a folder has no results of an older run. Collective.
+
+    Args:
+        folder: The folder; it need not exist.
+        comm: Communicator of the run.
+        overwrite: Whether older histories and summaries are removed; else they are refused.
+        subfolders: Whether the same holds for its subfolders.
+
+    Raises:
+        FileExistsError: There is an older history, which is not to be overwritten, on all ranks.
+    """
+
+    def claim() -> None:
+        older = sorted(Path(folder).glob("**/history.csv" if subfolders else "history.csv"))
+        if older and not overwrite:
+            raise FileExistsError(f"{older[0]} is of an older run: choose another folder, or overwrite it")
+        for history in older:
+            history.unlink()
+            history.with_name("summary.json").unlink(missing_ok=True)
+
+    on_root(comm, claim)
 
 
 class FieldWriter(_Closing):
@@ -192,28 +220,47 @@ class FieldWriter(_Closing):
             self._derived.append(_Derived.of(u, u.name, u))
         groups = {"displacement": [u], "fields": [d.shown for d in self._derived], **surfaces}
         comm = u.function_space.mesh.comm
-        _on_root(comm, lambda: Path(directory).mkdir(parents=True, exist_ok=True))
+        on_root(comm, lambda: Path(directory).mkdir(parents=True, exist_ok=True))
         self._stack = ExitStack()
         self._writers = [
             self._stack.enter_context(io.VTXWriter(comm, f"{directory}/{stem}.bp", functions, engine="BP4"))
             for stem, functions in groups.items()
             if functions
         ]
+        self._comm, self._directory = comm, Path(directory)
+        self._bytes = comm.allreduce(sum(_bytes(f) for functions in groups.values() for f in functions))
 
     def write(self, time: float) -> None:
         """Evaluate the derived fields and write everything as the state at one time. Collective.
 
         Args:
             time: Time or load parameter, greater than that of the last call.
+
+        Raises:
+            OSError: There is no space for it, on all ranks.
         """
+        on_root(self._comm, self._check_space)
         for field in self._derived:
             field.update()
         for writer in self._writers:
             writer.write(time)
 
+    def _check_space(self) -> None:
+        """ADIOS2 does not survive a full disk: it waits for ever or ends the process."""
+        free = shutil.disk_usage(self._directory).free
+        if free < self._bytes + _RESERVE:
+            words = f"no space for the fields in {self._directory}: {free / 1e6:.3g} MB free, "
+            raise OSError(errno.ENOSPC, words + f"{(self._bytes + _RESERVE) / 1e6:.3g} MB needed")
+
     def close(self) -> None:
         """Close the files. Collective; a second call does nothing."""
         self._stack.close()
+
+
+def _bytes(f: fem.Function) -> int:
+    """Upper bound of what a file takes for a function of this rank at one time: three components, grid and ghosts."""
+    cells, points = f.function_space.dofmap.list.shape
+    return 8 * (cells * (points + 2) + 2 * 3 * (f.x.index_map.size_local + f.x.index_map.num_ghosts))
 
 
 def interpolate(function: fem.Function, expression: Expr) -> None:
@@ -256,8 +303,13 @@ class _Derived:
             self.shown.interpolate(self.sample)
 
 
-def _on_root(comm: MPI.Comm, action: Callable[[], None]) -> None:
-    """Run an action on the first rank; what it raises is raised on every rank."""
+def on_root(comm: MPI.Comm, action: Callable[[], None]) -> None:
+    """Run an action on the first rank; what it raises is raised on every rank. Collective.
+
+    Args:
+        comm: Communicator of the run.
+        action: What to do.
+    """
     error = None
     if comm.rank == 0:
         try:

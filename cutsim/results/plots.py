@@ -41,12 +41,14 @@ class Curve:
         y: Ordinates, as many.
         label: Text in the legend; an empty one leaves the curve out of it.
         style: Line and marker in matplotlib's short form, such as ``"-"``, ``"--"`` or ``"o"``.
+        partial: Whether it ends early, as that of an interrupted run: a cross at its end and the legend then say so.
     """
 
     x: ArrayLike
     y: ArrayLike
     label: str = ""
     style: str = "-"
+    partial: bool = False
 
 
 def plot_curves(
@@ -72,7 +74,10 @@ def plot_curves(
         figure = Figure()
         axes = figure.add_subplot(xlabel=xlabel, ylabel=ylabel, title=title)
         for curve in curves:
-            axes.plot(curve.x, curve.y, curve.style, label=curve.label or None)
+            label = f"{curve.label} (ends early)".lstrip() if curve.partial else curve.label
+            (line,) = axes.plot(curve.x, curve.y, curve.style, label=label or None)
+            if curve.partial:
+                axes.plot(line.get_xdata()[-1:], line.get_ydata()[-1:], "x", color=line.get_color(), markersize=9)
         for label, level in (references or {}).items():
             axes.axhline(level, color="0.35", linewidth=1.2, linestyle="--", zorder=1)
             axes.annotate(

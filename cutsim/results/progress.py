@@ -69,6 +69,11 @@ class Progress:
         if time.monotonic() - self._last >= self._interval:
             self._print()
 
+    def say(self, text: str) -> None:
+        """Write a line beside the progress."""
+        if self._active:
+            self._console.print(text, markup=False)
+
     def __enter__(self) -> Self:
         if self._active and self._console.is_terminal and os.environ.get("TTY_COMPATIBLE") != "0":
             self._bar = Bar(

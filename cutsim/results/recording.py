@@ -4,18 +4,19 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from dolfinx import fem
+from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.analysis.stepping import Problem, StepError, StepReport
+from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
 from cutsim.base.checks import nonnegative, require, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.units import Units
 from cutsim.interface.crack import Crack
-from cutsim.results.output import FieldWriter, HistoryWriter
+from cutsim.results.output import FieldWriter, HistoryWriter, claim_folder, write_summary
 from cutsim.results.progress import Progress
 
 Columns = dict[str, tuple[float, str]]
@@ -28,7 +29,8 @@ class Recording:
     """Recorder of a run: pass it to `cutsim.analysis.stepping.run`. Use it as a context manager; collective.
 
     Writes ``history.csv`` row by row and, every few steps and after the last, also if the run fails or is stopped,
-    ``displacement.bp``, ``fields.bp`` and a file for each crack, and shows progress.
+    ``displacement.bp``, ``fields.bp`` and a file for each crack, and shows progress.  It ends with one line that says
+    whether the run is to be trusted, and with the same in ``summary.json``.
 
     Args:
         folder: Where the files go.
@@ -40,9 +42,13 @@ class Recording:
         extra: Further columns, computed from those of the step on all ranks.
         derived: Name → UFL expression of fields such as stress.
         every: Fields are written every so many steps, ≥ 1; 0 for no fields.
+        overwrite: Whether the results of an older run in the folder are replaced.
 
     Attributes:
         history: Column → list of values so far, the same on all ranks.
+
+    Raises:
+        FileExistsError: The folder has the history of an older run, which is not to be overwritten.
     """
 
     def __init__(
@@ -57,9 +63,12 @@ class Recording:
         extra: Callable[[Columns], Columns] = lambda _: {},
         derived: Mapping[str, Expr] | None = None,
         every: int = 5,
+        overwrite: bool = False,
     ) -> None:
         require_number("every", every, nonnegative)
         self.folder, self.problem, self._units = Path(folder), problem, units or Units()
+        self._title, self._until, self._values = title, until, dict[str, Any]()
+        claim_folder(self.folder, problem.state.mesh.comm, overwrite=overwrite, subfolders=False)
         self._show, self._extra, self._every = dict(show or {}), extra, every
         self.history: dict[str, list[float]] = {}
         self._stack = ExitStack()
@@ -104,6 +113,24 @@ class Recording:
         if self._fields is not None:
             self._fields.write(time)
 
+    def summary(self, values: Mapping[str, Any] | None = None) -> None:
+        """Write ``summary.json``: verdict and reasons, how far the run came, and headline numbers. Collective.
+
+        Args:
+            values: Headline numbers, beside those given before; see `cutsim.results.output.write_summary`.
+        """
+        self._values |= values or {}
+        write_summary(self.folder / "summary.json", self._summary(), self.problem.state.mesh.comm)
+
+    def _summary(self) -> dict[str, Any]:
+        state = self.problem.state
+        return {**state.verdict.record(), "time": state.time_old, "until": self._until, **self._values}
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run has come to its end."""
+        return self.problem.state.time_old >= self._until
+
     def column(self, name: str) -> NDArray[np.float64]:
         """A column of the history so far.
 
@@ -123,10 +150,18 @@ class Recording:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        state = self.problem.state
         # only these ends are known to be met by all ranks
-        if self._unwritten is not None and (kind is None or issubclass(kind, StepError)):
-            self.write_fields(self._unwritten)
-        self._stack.close()
+        together = kind is None or issubclass(kind, StepError | Interrupted)
+        with self._stack:
+            if together and self._unwritten is not None:
+                self.write_fields(self._unwritten)
+            if not together:
+                state.verdict.doubt("failed", f"ended at time {state.time_old:.6g} of {self._until:.6g} by {error!r}")
+        summary = MPI.COMM_SELF if not together else state.mesh.comm
+        if together or state.mesh.comm.rank == 0:
+            write_summary(self.folder / "summary.json", self._summary(), summary)
+        self._progress.say(f"{self._title}: {state.verdict}")
 
 
 class _CrackFields:

@@ -37,6 +37,10 @@ BC_ROUNDING = 1e-12
 _COLLECT = 16
 #: Growth of the residual at which an iteration is given up.
 GROWTH = 1e6
+#: A backtracking search crawls at a kink: it is given up where the residual has not fallen to this fraction ...
+STALLED = 0.95
+#: ... in so many iterations.
+STALL = 5
 
 _Reason = PETSc.SNES.ConvergedReason
 # SNES stops for a new matrix, and goes on
@@ -210,6 +214,7 @@ class NonlinearProblem:
         # stol = 0: a small step is no sign of equilibrium.
         self._snes.setTolerances(rtol=rtol, stol=0.0, max_it=25)
         self._options.default({"snes_linesearch_type": LINE_SEARCHES[0], **compat.LINE_SEARCH_OPTIONS})
+        self._line_search = LINE_SEARCHES[0]
         self._lagged: LaggedPC | None = None
         if "pc_type" not in self._options and "ksp_type" not in self._options:
             has_interface, gdim = self._interface_dofs is not None, self.u.function_space.mesh.geometry.dim
@@ -260,6 +265,7 @@ class NonlinearProblem:
             require("line_search", line_search, line_search in LINE_SEARCHES, f"one of {', '.join(LINE_SEARCHES)}")
             self._options.set("snes_linesearch_type", line_search)
             self._snes.setFromOptions()
+            self._line_search = line_search
         with Timer("~cutsim: nonlinear solve"):
             iterations, linear = self._iterate()
         self._assign(self._x)
@@ -436,6 +442,8 @@ class NonlinearProblem:
             return _Reason.CONVERGED_FNORM_RELATIVE
         if free > GROWTH * max(start, self._scale):
             return _Reason.DIVERGED_DTOL
+        if self._line_search == "bt" and len(self._residuals) > STALL and free > STALLED * self._residuals[-1 - STALL]:
+            return _Reason.DIVERGED_LOCAL_MIN
         return _Reason.ITERATING
 
     def destroy(self) -> None:

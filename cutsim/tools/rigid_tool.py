@@ -1,5 +1,6 @@
 """What all rigid tools have in common: a path, a force and a moment, the work on the body (docs/theory.md §4)."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import as_array, require
 from cutsim.base.terms import Term
 from cutsim.fields.state import State
+from cutsim.interface.doubts import doubt_penetration
 from cutsim.interface.slip import SlipHistory
 from cutsim.tools.shapes import Path
 
@@ -16,7 +18,7 @@ _AXES = "xyz"
 _Action = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
-class RigidTool(Term):
+class RigidTool(Term, ABC):
     """A rigid tool whose reference point follows a path without turning.
 
     Args:
@@ -39,6 +41,7 @@ class RigidTool(Term):
         self._position_old = start.copy()
         self._action: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
         self._action_old: _Action = self._action
+        state.verdict.suppose(self._untouched, f"{name} has never touched the body")
 
     @property
     def slips(self) -> Sequence[SlipHistory]:
@@ -89,6 +92,25 @@ class RigidTool(Term):
             kind = self.state.facet_measure
             columns |= {f"{self.name}_sticking": (float(sticks), kind), f"{self.name}_slipping": (float(slips), kind)}
         return columns
+
+    @abstractmethod
+    def penetration(self) -> float:
+        """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""
+
+    def watch(self) -> None:
+        """Doubt a tool that has not touched the body yet, or that lies deep in it. Collective."""
+        depth = self.penetration()
+        if depth > 0:
+            self.state.verdict.withdraw(self._untouched)
+        doubt_penetration(self.state.verdict, self.name, depth)
+
+    def may_miss(self) -> None:
+        """Say that a run is to be trusted also if the tool does not come to these surfaces of the body."""
+        self.state.verdict.withdraw(self._untouched)
+
+    @property
+    def _untouched(self) -> str:
+        return f"{self.name}: untouched"
 
     def rollback(self) -> None:
         """Move the tool back to the start of the step."""

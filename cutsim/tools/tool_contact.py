@@ -11,18 +11,17 @@ from cutsim.base.assembly import integrate, moment, nodal_forces, resultant
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps, form
 from cutsim.base.kinematics import Expr, tangential
-from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
 from cutsim.base.signatures import checked
+from cutsim.base.verdict import Verdict
 from cutsim.fields.points import Surface, Values
+from cutsim.fields.sizes import normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import Path, Shape, check_directions
-
-logger = collective_logger(__name__)
 
 
 class Patch:
@@ -60,6 +59,7 @@ class Patch:
         normal = ufl.diff(shape.distance(x), x)
         self._contact = with_constants(state.mesh, contact)
         self._penetration = -shape.distance(self.place)
+        self._normal_size = surface.points.mean(normal_size(state.mesh, surface.points.facets))
         self._pressure = self._contact.pressure(self._penetration)
         self.thrust = -self._pressure * normal
         self.slip: SlipHistory | None = None
@@ -83,6 +83,14 @@ class Patch:
     def energy(self) -> ufl.Form:
         """Energy of the contact penalty."""
         return self._contact.energy(self._penetration) * self.surface.measure
+
+    @cached_property
+    def _depths(self):  # type: ignore[no-untyped-def]
+        return self.surface.points.evaluator({"depth": self._penetration})
+
+    def penetration(self) -> float:
+        """Largest depth of a point in the tool over the mesh size normal to the surface, < 0 outside. Collective."""
+        return self.surface.points.maximum(self._depths()["depth"]) / self._normal_size
 
     @cached_property
     def _evaluate(self):  # type: ignore[no-untyped-def]
@@ -166,6 +174,10 @@ class ToolContact(RigidTool):
         for slip in self.slips:
             slip.evaluate()
 
+    def penetration(self) -> float:
+        """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""
+        return max(p.penetration() for p in self.patches)
+
     def energies(self) -> dict[str, float]:
         """Energy of the contact penalties and friction work so far. Collective."""
         total = {"contact": integrate(self._energy_form), "friction": 0.0}
@@ -187,10 +199,26 @@ class ToolContact(RigidTool):
             slip.commit()
 
 
-def warn_coarse(name: str, shape: Shape, facet_size: float) -> None:
-    """Warn with numbers if facets are larger than the smallest radius of a tool."""
-    if facet_size > (1 + 1e-6) * shape.resolution:
-        logger.warning(
-            "%s: facets of %.3g do not resolve the tool's radius %.3g: use %.3g or less",
-            name, facet_size, shape.resolution, shape.resolution,
-        )  # fmt: skip
+def doubt_size(verdict: Verdict, name: str, shape: Shape, facet_size: float, body: float) -> None:
+    """Doubt a tool whose smallest radius the facets do not resolve, or that is larger than the whole body.
+
+    Args:
+        verdict: Where to say so.
+        name: Name of the tool.
+        shape: The tool.
+        facet_size: Mean size of the facets it meets [length].
+        body: Largest extent of the body [length].
+    """
+    radius = shape.resolution
+    if facet_size > (1 + 1e-6) * radius:
+        verdict.doubt(
+            f"{name}: radius",
+            f"{name}: facets of {facet_size:.3g} do not resolve the tool's radius {radius:.3g}: use {radius:.3g} or "
+            "less",
+        )
+    if radius > body:
+        verdict.doubt(
+            f"{name}: size",
+            f"{name}: the tool's radius {radius:.3g} is larger than the whole body, {body:.3g}: are both in the same "
+            "units?",
+        )

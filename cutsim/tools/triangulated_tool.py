@@ -12,7 +12,7 @@ from cutsim.base.assembly import add_blocks, moment
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.base.terms import AssembledTerm
-from cutsim.fields.sizes import facet_size
+from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
@@ -97,6 +97,7 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, self.position, self._position_old)
         self._search = search or size
+        self._normal_size = points.mean(normal_size(state.mesh, points.facets))
         slave = OuterSurface(state.V, points.facets)
         kinematics = PairKinematics(slave, master, fixed=False, search=self._search, size=size)
         laws = PairLaws(None, contact, friction, None, None)
@@ -130,6 +131,10 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
         arms[:, :gdim] = pairs.slave.x[points] + pairs.distance - self.position.value
         forces = -self.touch.point_forces()[points]
         self.act(-self.touch.force, moment(self.state.mesh.comm, forces.ravel(), arms, gdim))
+
+    def penetration(self) -> float:
+        """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""
+        return self.touch.points.maximum(-self.touch.history.trial["opening"]) / self._normal_size
 
     def energies(self) -> dict[str, float]:
         """Energy of the contact penalty, friction work, and work of the pressure that neither holds. Collective."""

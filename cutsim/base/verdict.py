@@ -1,0 +1,59 @@
+"""Whether what was computed can be trusted, and what speaks against it."""
+
+from cutsim.base.log import collective_logger
+
+logger = collective_logger(__name__)
+
+#: What may be missing in books of energy or heat, relative to their largest turnover.
+CLOSURE = 0.02
+
+
+class Verdict:
+    """What speaks against a result, gathered while it comes about; without any reason it is trusted.
+
+    Whoever sees something wrong says so in words: this is warned of once, when it is first seen, and the worst case is
+    kept.  Every rank has to say the same.
+    """
+
+    def __init__(self) -> None:
+        self._reasons: dict[str, tuple[float, str]] = {}
+        self._pending: dict[str, str] = {}
+
+    def doubt(self, kind: str, words: str, measure: float = 0.0) -> None:
+        """Say what makes the result questionable.
+
+        Args:
+            kind: What it is about, such as "crack: penetration"; warned of once each.
+            words: The reason, with numbers.
+            measure: How bad it is; of one kind the worst is kept.
+        """
+        known = self._reasons.get(kind)
+        if known is None:
+            logger.warning("%s", words)
+        if known is None or measure > known[0]:
+            self._reasons[kind] = measure, words
+
+    def suppose(self, kind: str, words: str) -> None:
+        """Say what makes the result questionable unless it is withdrawn before the end; nothing is warned of."""
+        self._pending[kind] = words
+
+    def withdraw(self, kind: str) -> None:
+        """Take back what was supposed; nothing happens if nothing was."""
+        self._pending.pop(kind, None)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What speaks against the result, in the order in which it was seen."""
+        return (*(words for _, words in self._reasons.values()), *self._pending.values())
+
+    @property
+    def trusted(self) -> bool:
+        """Whether nothing speaks against the result."""
+        return not self.reasons
+
+    def record(self) -> dict[str, str | list[str]]:
+        """The fields "verdict" and "reasons" of a summary."""
+        return {"verdict": "trusted" if self.trusted else "questionable", "reasons": list(self.reasons)}
+
+    def __str__(self) -> str:
+        return "trusted" if self.trusted else "questionable: " + "; ".join(self.reasons)
