@@ -16,7 +16,6 @@ from cutsim.analysis.mobility import extent, free_motion
 from cutsim.base.assembly import global_dot
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
-from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.base.verdict import CLOSURE
@@ -30,8 +29,6 @@ from cutsim.fields.twins import unjoined
 from cutsim.interface.crack import Crack
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.solvers.newton import NonlinearProblem, Outcome
-
-logger = collective_logger(__name__)
 
 # displacement over the size of the mesh at which a solve is given up
 _RUNAWAY = 100.0
@@ -113,7 +110,7 @@ class Mechanics:
         pairs = [facets for t in terms if isinstance(t, SurfacePair) for facets in t.facets]
         self._apart = unjoined(state.mesh, np.concatenate([np.empty(0, dtype=np.int32), *pairs]))
         if self._apart:
-            logger.warning("mesh: %s", self._apart)
+            state.verdict.doubt("mesh", f"mesh: {self._apart}")
         self._begun = False
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
         self._residual_old: NDArray[np.float64] = self._residual

@@ -6,22 +6,21 @@ from dolfinx.mesh import Mesh, compute_midpoints, exterior_facet_indices
 from numpy.typing import NDArray
 
 from cutsim.base.checks import place
-from cutsim.base.log import collective_logger
+from cutsim.base.verdict import Verdict
 from cutsim.fields.sizes import incidence
 from cutsim.fields.space import CRACKED, refuse, sum_over_ranks
 
-logger = collective_logger(__name__)
 
-
-def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) -> None:
+def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:
     """Refuse a crack on facets along which the space holds together: it could not open. Collective.
 
-    A single facet that is missing in the middle of the cracks, and holds them together, is warned of.
+    A single facet that is missing in the middle of the cracks, and holds them together, is a doubt.
 
     Args:
         V: The space.
         facets: Local facets of the crack.
         name: Name of the crack.
+        verdict: Where to say so.
 
     Raises:
         ValueError: On all ranks, with the number of these facets and the place of one.
@@ -38,11 +37,11 @@ def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) ->
         )
     refuse(V.mesh.comm, problem)
     if cracked is not None:
-        _warn_gaps(V.mesh, cracked, facets, name)
+        _doubt_gaps(V.mesh, cracked, facets, name, verdict)
 
 
-def _warn_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32], name: str) -> None:
-    """Warn of facets that hold a crack together in its middle: it goes on beyond each of their ridges."""
+def _doubt_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:
+    """Doubt facets that hold a crack together in its middle: it goes on beyond each of their ridges."""
     fdim = mesh.topology.dim - 1
     mesh.topology.create_entities(fdim - 1)
     ridges, ridge_map = incidence(mesh, fdim, fdim - 1), mesh.topology.index_map(fdim - 1)
@@ -62,10 +61,11 @@ def _warn_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32]
     found = np.flatnonzero(gap).astype(np.int32)
     places = [p for p in mesh.comm.allgather([_place(mesh, found[i : i + 1]) for i in range(len(found))]) for p in p]
     if places:
-        logger.warning(
-            "%s: %d single facets are missing in the middle of the crack, the first at %s; they hold it together",
-            name, len(places), places[0],
-        )  # fmt: skip
+        verdict.doubt(
+            f"{name}: gaps",
+            f"{name}: {len(places)} single facets are missing in the middle of the crack, the first at {places[0]}; "
+            "they hold it together",
+        )
 
 
 def _place(mesh: Mesh, facet: NDArray[np.int32]) -> str:

@@ -103,7 +103,7 @@ class Crack(Term):
         self._current = normal == "current"
         self._allowed_penetration = penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
-        check_cracked(state.V, facets, name)
+        check_cracked(state.V, facets, name, state.verdict)
         self.points = FacetPoints(
             state.mesh, np.asarray(facets, dtype=np.int32), state.measures.interior(self.entities), interior=True
         )
