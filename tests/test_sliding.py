@@ -471,6 +471,59 @@ def test_refusal(name):
         two(2).pair(**BAD[name])
 
 
+def overlapping(gdim, n, overlap=0.1, drop=0.0, **options):
+    """Two unit blocks (E 1, ν 0) with held outer faces, of n and n + 1 cells a side: force between them."""
+    across = gdim - 1
+    lower = ([0.0] * gdim, [1.0] * gdim, [n] * gdim)
+    upper = ([0.0] * across + [1 - overlap], [1.0] * across + [2 - overlap], [n + 1] * gdim)
+    s = stack(lower, upper)
+    pair = s.pair(contact=PenaltyContact(1e3), **options)
+    supports = [*s.drive(0, 0, [0.0] * gdim), *s.drive(1, 1, [0.0] * across + [lambda t: -drop * t], "top")]
+    mechanics = Mechanics(s.state, [Solid(s.state, NeoHookean(1.0, 0.0)), pair], supports)
+    return -history(mechanics, 1.0, StepControl.fixed(1.0))[f"top_{'xyz'[across]}_force"][-1]
+
+
+# of blocks that shorten from 1 to 0.95
+PRESSED = 0.5 * (1 / 0.95 - 0.95)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("gdim", "n"), [(2, 4), (2, 10), (2, 20), (3, 5)])
+def test_an_overlap_is_found_whatever_the_facets(gdim, n):
+    assert overlapping(gdim, n) == pytest.approx(PRESSED, rel=1e-3)
+    if gdim == 2:
+        assert overlapping(gdim, n, search=0.01) == pytest.approx(PRESSED, rel=1e-3)
+        assert overlapping(gdim, n, two_pass=True) == pytest.approx(PRESSED, rel=1e-3)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("n", [4, 20])
+def test_surfaces_do_not_pass_each_other_in_a_step(n):
+    """They close a gap of 0.1 and 0.1 more in one step, whatever the facets."""
+    assert overlapping(2, n, overlap=-0.1, drop=0.2) == pytest.approx(PRESSED, rel=1e-3)
+
+
+@pytest.mark.mpi
+def test_the_far_side_of_a_thin_body_is_no_partner():
+    """Two sheets that move far together in a step: the face of one does not meet the far face of the other."""
+    s = stack(((0.0, 0.0), (1.0, 0.05), (4, 1)), ((0.0, 0.06), (1.0, 0.11), (4, 1)))
+    faces = [np.concatenate([s.face(box, 1, end) for end in (0, 1)]) for box in (1, 0)]
+    kinematics = SurfacePair(s.state, *faces, young=E, search=0.02).passes[0].kinematics
+    before = kinematics.pairs(kinematics.nodes(s.state.u.x.array)).hits
+    s.move(lambda x: np.stack([0 * x[0], 0 * x[0] + 0.3]))
+    after = kinematics.pairs(kinematics.nodes(s.state.u.x.array)).hits
+    np.testing.assert_array_equal(after.points, before.points)
+    np.testing.assert_allclose(after.gap, 0.01, rtol=1e-9)
+
+
+@pytest.mark.mpi
+def test_overlaps_that_face_nothing_are_refused():
+    """A block in another one, whose top and bottom are slaves of the other's sides."""
+    s = stack(((0.0, 0.0), (1.0, 1.0), (4, 4)), ((0.3, 0.3), (0.7, 0.7), (2, 2)))
+    with pytest.raises(ValueError, match=r"slave_facets: \d+ points lie in the body of master_facets .* deep"):
+        SurfacePair(s.state, s.face(1, 1, 1), s.face(0, 1, 1), young=E)
+
+
 @pytest.mark.mpi
 def test_refusal_of_one_surface_with_itself():
     b = two(2)

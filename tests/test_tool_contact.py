@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from conftest import NU, E, history, make_blocks
-from dolfinx import fem
+from conftest import EXPONENTIAL, NU, E, history, make_blocks
+from dolfinx import fem, mesh
+from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
@@ -135,6 +136,55 @@ def test_refuses_what_cannot_touch():
         PenaltyContact(0)
     with pytest.raises(ValueError, match="blend = -1 is not allowed"):
         PenaltyContact(1.0, -1)
+
+
+def pressed_sheet(step):
+    """A clamped sheet pressed down by a ball that begins above it: force at the end."""
+    domain = mesh.create_rectangle(
+        MPI.COMM_WORLD, [(0, 0), (4, 0.2)], (20, 2), mesh.CellType.quadrilateral, ghost_mode=mesh.GhostMode.shared_facet
+    )
+    state = State(fem.functionspace(domain, ("Lagrange", 1, (2,))))
+    ends = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(np.abs(x[0] - 2), 2))
+    faces = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(np.abs(x[1] - 0.1), 0.1))
+    path = Path.polyline([0, 1], [(2, 0.9), (2, -4.1)])
+    ball = ToolContact(state, Ball(0.5), path, [Surface.exterior(state, faces)], contact=PenaltyContact(20.0))
+    mechanics = Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], [Support(state, ends, i) for i in (0, 1)])
+    return history(mechanics, 0.3, StepControl(step, step, smallest=1e-3))
+
+
+@pytest.mark.mpi
+def test_no_step_carries_a_tool_through_a_sheet(caplog):
+    """A step of 1.5 would pass the sheet of 0.2: it is cut, and ends as small ones do."""
+    caplog.set_level("INFO")
+    large, small = pressed_sheet(0.3), pressed_sheet(0.025)
+    assert MPI.COMM_WORLD.rank or "tool has passed through the surface of the body at" in caplog.text
+    assert len(large["time"]) < len(small["time"])
+    assert large["tool_force_y"][-1] > 0.05
+    assert large["tool_force_y"][-1] == pytest.approx(small["tool_force_y"][-1], rel=1e-6)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("depth", [0.1, 0.25, 0.35, 0.45, 0.6])
+def test_a_tool_may_not_begin_behind_the_surface(depth, caplog):
+    """A ball of radius 0.3 pushes down as long as its middle is above the surface; where it is below, it is refused."""
+    b = make_blocks(n=8)
+    top = Surface.exterior(b.state, b.face(1, 1.0))
+
+    def ball():
+        path = Path.polyline([0, 1], [(0.5, 1.3 - depth), (0.5, 1.25 - depth)])
+        return ToolContact(b.state, Ball(0.3), path, [top], contact=PenaltyContact(20.0), name="ball")
+
+    if depth < 0.3:
+        solid, base = Solid(b.state, NeoHookean(E, NU)), [Support(b.state, b.face(1, 0.0), i) for i in (0, 1)]
+        crack = b.crack(EXPONENTIAL)
+        rows = history(Mechanics(b.state, [solid, crack, ball()], base), 1.0, StepControl(1.0, 1.0))
+        assert rows["ball_force_y"][-1] > 0.1
+    elif depth < 0.6:
+        with pytest.raises(ValueError, match=r"path of 'ball': at its start .* behind the middle of the tool, up to 0"):
+            ball()
+    else:
+        ball()
+        assert MPI.COMM_WORLD.rank or ("ball begins 0.0" in caplog.text and "inside the body" in caplog.text)
 
 
 def test_coarse_mesh_is_named_with_numbers(caplog):

@@ -185,6 +185,21 @@ def test_tool_that_moves_farther_in_a_step_than_a_facet(gdim, n):
 # -- tangent, state ---------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.mpi
+@pytest.mark.parametrize("depth", [0.1, 0.3, 0.45])
+def test_tool_that_begins_in_the_body(depth):
+    """It pushes inwards, the more the deeper, also where its middle is below the surface; alike on all meshes."""
+    start = np.array([0.45, 1 + R - depth])
+    path = Path.polyline([0, 1], [start, start - (0.0, 0.01)])
+    force = []
+    for n, level in ((4, 1), (8, 2)):
+        options = {"friction": None, "contact": PenaltyContact(20.0)}
+        rows = history(indented(2, ball(2, level), path, n, **options)[0], 1.0, StepControl.fixed(1.0))
+        force.append(rows["tool_force_y"][-1])
+    assert force[0] == pytest.approx(force[1], rel=0.08)
+    assert force[1] == pytest.approx({0.1: 0.12, 0.3: 0.46, 0.45: 0.77}[depth], rel=0.08)
+
+
 @pytest.mark.parametrize("friction", [None, Coulomb(50.0, 7.0), Coulomb(0.4, 1e3)], ids=["smooth", "stick", "slip"])
 @pytest.mark.parametrize(("gdim", "degree"), [(2, 1), (2, 2), (3, 1)])
 def test_tangent(gdim, degree, friction):

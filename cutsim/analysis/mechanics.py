@@ -107,8 +107,7 @@ class Mechanics:
             largest=_RUNAWAY * extent(state.mesh.comm, state.mesh.geometry.x),
         )
         self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
-        pairs = [facets for t in terms if isinstance(t, SurfacePair) for facets in t.facets]
-        self._apart = unjoined(state.mesh, np.concatenate([np.empty(0, dtype=np.int32), *pairs]))
+        self._apart = unjoined(state.mesh, [t.facets for t in terms if isinstance(t, SurfacePair)])
         if self._apart:
             state.verdict.doubt("mesh", f"mesh: {self._apart}")
         self._begun = False
@@ -189,7 +188,7 @@ class Mechanics:
         return forces
 
     def solve(self, line_search: str | None = None) -> Outcome:
-        """Find equilibrium, with contact augmentations. Collective.
+        """Find equilibrium, with contact augmentations, that no term objects to. Collective.
 
         Args:
             line_search: "l2", "bt" or "basic"; the solver's default if None.
@@ -208,6 +207,8 @@ class Mechanics:
         else:
             message = f"contact not settled by {AUGMENTATIONS} augmentations"
             outcome = replace(outcome, converged=False, message=message)
+        if outcome.converged and (objections := [why for t in self.terms if (why := t.objection())]):
+            outcome = replace(outcome, converged=False, message="; ".join(objections))
         return outcome
 
     def evaluate(self) -> None:

@@ -56,9 +56,11 @@ def free_motion(
     matrix = comm.allreduce(0.5 * (matrix + matrix.T))
     scale = 1 / np.sqrt(np.repeat(np.maximum(sizes, 1), kinds))
     values, vectors = np.linalg.eigh(scale[:, None] * matrix * scale)
-    if values[0] > _NOTHING:
+    # pressed surfaces may make a motion easier than none: that is no want of a support
+    nothing = np.abs(values) <= _NOTHING
+    if not nothing.any():
         return None
-    free = (scale[:, None] * vectors[:, values <= _NOTHING]).T
+    free = (scale[:, None] * vectors[:, nothing]).T
     moving = int(np.abs(free[0]).argmax()) // kinds
     own = free[:, moving * kinds : (moving + 1) * kinds]
     return f"{_name(state, bodies, piece == moving, count)} can {_words(own, gdim, axisymmetric=state.axisymmetric)}"

@@ -103,6 +103,10 @@ class Term:
         """Improve a multiplier after equilibrium; True if the step has to be solved again. Collective."""
         return False
 
+    def objection(self) -> str | None:
+        """After equilibrium: why the trial state cannot be the end of this step, in words, or None. Collective."""
+        return None
+
     def evaluate(self) -> None:
         """Compute trial history and energies from the converged trial displacement. Collective."""
 

@@ -105,6 +105,10 @@ class FacetPoints:
         """Largest point value, −∞ if there is no point. Collective."""
         return float(self.submesh.comm.allreduce(float(values[: self._owned].max(initial=-np.inf)), op=MPI.MAX))
 
+    def count(self, where: NDArray[np.bool_]) -> int:
+        """Number of points at which something holds. Collective."""
+        return int(self.submesh.comm.allreduce(int(np.count_nonzero(where[: self._owned])), op=MPI.SUM))
+
     def facet_mean(self, values: Values) -> Values:
         """Mean over each local facet of point values."""
         return (values * self.weights).sum(axis=1) / self.weights.sum(axis=1)

@@ -1,5 +1,6 @@
 """Nodes that lie on each other without being one: bodies that touch and were not merged, meshes that are split."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,16 +69,19 @@ def split_along(mesh: Mesh, facets: NDArray[np.int32]) -> bool:
     return len(twins) > 0 and mesh.comm.allreduce(int(alone.sum())) == 0
 
 
-def unjoined(mesh: Mesh, joined: NDArray[np.int32]) -> str | None:
-    """Pieces of a mesh that lie on each other and have no node in common, in words. Collective.
+def unjoined(mesh: Mesh, pairs: Sequence[Sequence[NDArray[np.int32]]]) -> str | None:
+    """Pieces of a mesh that lie on each other, have no node in common and are not joined, in words. Collective.
 
     Args:
         mesh: The mesh.
-        joined: Local facets of the surfaces that others join, such as those of pairs of surfaces.
+        pairs: Local facets of the two surfaces of each pair that joins the pieces to which they belong.
     """
-    known = np.concatenate(mesh.comm.allgather(global_nodes(mesh, facet_nodes(mesh, joined))))
-    twins = find_twins(mesh)
-    apart = (twins.pieces[:, 0] != twins.pieces[:, 1]) & ~np.isin(twins.nodes, known).all(axis=1)
+    of_nodes, twins = mesh_pieces(mesh)[1], find_twins(mesh)
+    apart = twins.pieces[:, 0] != twins.pieces[:, 1]
+    for pair in pairs:
+        joined = [np.concatenate(mesh.comm.allgather(np.unique(of_nodes[facet_nodes(mesh, f)]))) for f in pair]
+        for one, other in (joined, joined[::-1]):
+            apart &= ~(np.isin(twins.pieces[:, 0], one) & np.isin(twins.pieces[:, 1], other))
     places = twins.places[apart]
     if not len(places):
         return None

@@ -2,9 +2,12 @@
 
 import basix
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
+from cutsim.base.assembly import box
 from cutsim.fields.points import DEGREE
-from cutsim.pairs.outer_surface import Master, OuterSurface
+from cutsim.pairs.outer_surface import Master, OuterSurface, normals
 from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, project
 from cutsim.pairs.points import Pairs, Points
 
@@ -14,6 +17,8 @@ DEGREES = {1: DEGREE, 2: 8}
 MARGIN = 0.25
 #: Gap that is taken for none, as a fraction of that size.
 TOUCH = 1e-12
+#: Cosine between the normals of a point and of the facet nearest to it from which one does not stand across the other.
+FACING = 0.5
 #: Multiple of the margin beyond which, or if not finite, a displacement is no state to look for partners in.
 WILD = 1e9
 
@@ -32,18 +37,18 @@ class PairKinematics:
         slave: The slave surface.
         master: The master surface.
         fixed: Whether pairs are fixed.
-        search: Largest distance of a partner [length].
+        search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
+            come into it during a step, find theirs at any depth.
         size: Mean size of the slave facets [length].
 
     Attributes:
-        search: Largest distance of a partner; it may change between steps [length].
         tables: Shape functions and derivatives at the points of a slave facet.
         version: Grows when other facets have come near each other.
         near: Slave and master facets that are near each other.
     """
 
     def __init__(self, slave: OuterSurface, master: Master, *, fixed: bool, search: float, size: float) -> None:
-        self.slave, self.master, self.fixed, self.search = slave, master, fixed, search
+        self.slave, self.master, self.fixed, self._search = slave, master, fixed, search
         shape = slave.shape.element
         places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
         self.tables = slave.shape.values(places)
@@ -51,8 +56,13 @@ class PairKinematics:
         self.version = 0
         nodes = slave.reference, master.reference
         points = self._points(nodes[0])
-        self._look_around(points, nodes)
-        self._old, self._old_nodes, self._old_hits = points, nodes, self._hits(points, nodes)
+        self._old, self._old_nodes = points, nodes
+        # how deep points were at the start of the step, and which of them had a partner
+        self._deep, self._met = 0.0, np.zeros(len(points.x), dtype=bool)
+        self._look_around(points, nodes, search)
+        self._old_hits = self._hits(points, nodes)
+        if not fixed:
+            self._dig_out(points, nodes)
         self._slid: Array = np.zeros((len(points.x), points.x.shape[-1] - 1))
         self._offset = np.zeros_like(points.x)
         if fixed:
@@ -88,8 +98,9 @@ class PairKinematics:
             self._old_hits = self._hits(self._old, nodes)
 
     def commit(self, pairs: Pairs) -> None:
-        """Keep the slide at the end of a step."""
+        """Keep the slide, and which points had a partner how deep, at the end of a step."""
         self._slid = pairs.jump[:, 1:]
+        self._note(pairs.hits)
 
     @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
@@ -109,7 +120,7 @@ class PairKinematics:
 
     def _fixed_jump(self, points: Points, hits: Hits, distance: Array) -> Array:
         jump = np.zeros_like(points.x)
-        jump[:, 0] = self.search
+        jump[:, 0] = self._search
         jump[hits.points] = np.einsum("nai,ni->na", points.frames[hits.points], distance) - self._offset[hits.points]
         return jump
 
@@ -117,7 +128,7 @@ class PairKinematics:
         """The jump, and its rate with the place on the master facet."""
         frames, y = self._old.frames[hits.points, 1:], self._old_nodes[1][hits.facets]
         before = np.einsum("nb,nbi->ni", values, y) - self._old.x[hits.points]
-        jump = np.column_stack([np.full(len(self._slid), self.search), self._slid])
+        jump = np.column_stack([np.full(len(self._slid), self._search), self._slid])
         # surfaces that just touch count as pressed: rounding would decide which points feel the other one
         touch = TOUCH * self._size
         jump[hits.points, 0] = np.where(np.abs(hits.gap) <= touch, -touch, hits.gap)
@@ -138,27 +149,99 @@ class PairKinematics:
     def _points(self, nodes: Array) -> Points:
         return Points.on(nodes, self.slave.sides, self.tables)
 
+    def _note(self, hits: Hits) -> None:
+        self._met = np.zeros(len(self._met), dtype=bool)
+        self._met[hits.points] = True
+        self._deep = max(self.slave.maximum(float(-hits.gap.min(initial=0.0))), 0.0)
+
+    def _dig_out(self, points: Points, nodes: tuple[Array, Array]) -> None:
+        """Find partners of points that are in the other body, deeper than the search, from the start.
+
+        Raises:
+            ValueError: On all ranks, if there are none for some of them.
+        """
+        inside = self.master.holds(points.x, self.slave)
+        low, high = box(self.slave.V.mesh.comm, np.concatenate([n.reshape(-1, n.shape[-1]) for n in nodes]))
+        depth = self._buried(points, nodes, inside)
+        while (deepest := self.slave.maximum(depth.max(initial=0.0))) > 0:
+            lost = self.slave.total(int(np.count_nonzero(depth)))
+            if self._deep > np.linalg.norm(high - low):
+                raise ValueError(
+                    f"slave_facets: {lost} points lie in the body of master_facets from the start, about {deepest:.3g} "
+                    "deep, and their normals do not meet its surface: let the bodies overlap less, or give all facets "
+                    "that face each other"
+                )
+            # a ray may be longer than the way to the nearest facet
+            self._met, self._deep = inside, 2 * max(deepest, self._deep)
+            self._old_hits = self._hits(points, nodes)
+            depth = self._buried(points, nodes, inside)
+        self._note(self._old_hits)
+
+    def _buried(self, points: Points, nodes: tuple[Array, Array], inside: NDArray[np.bool_]) -> Array:
+        """Distance to the nearest facet of the master of points that are inside and have no partner; else 0.
+
+        Points beside which that facet stands across belong to a side of the body that faces nothing.
+        """
+        depth = np.zeros(len(points.x))
+        lost = inside.copy()
+        lost[self._old_hits.points] = False
+        rows = np.flatnonzero(lost & np.repeat(self.slave.owned, len(self.tables[0])))
+        if len(rows) and len(nodes[1]):
+            distance, nearest = cKDTree(nodes[1].mean(axis=1)).query(points.x[rows])
+            derivatives = self.master.shape.values(self.master.shape.centre[None])[1][0]
+            outward = self.master.sides[nearest, None] * normals(
+                np.einsum("kb,nbi->nki", derivatives, nodes[1][nearest])
+            )
+            facing = np.einsum("ni,ni->n", outward, points.frames[rows, 0]) / np.linalg.norm(outward, axis=1)
+            depth[rows] = np.where(np.abs(facing) > FACING, distance, 0.0)
+        return depth
+
     def _hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
-        if self._moved(nodes):
-            self._look_around(points, nodes)
+        reach = self._reach(nodes)
+        if self._moved(nodes, reach):
+            self._look_around(points, nodes, reach)
         count = len(self.tables[0])
         slaves, masters = self.near
         of_facet = slaves[:, None] * count + np.arange(count)
         pairs = of_facet.ravel(), np.repeat(masters, count)
-        return project(points.x, points.frames, pairs, nodes[1], self.master.sides, self.master.shape, self.search)
+        hits = project(points.x, points.frames, pairs, nodes[1], self.master.sides, self.master.shape, reach)
+        return hits.some(self._entered(hits))
 
-    def _moved(self, nodes: tuple[Array, Array]) -> bool:
+    def _reach(self, nodes: tuple[Array, Array]) -> float:
+        """How far partners are looked for: points are as deep as they were, and as the bodies have moved since."""
+        moved = sum(
+            np.linalg.norm(now - then, axis=-1).max(initial=0.0)
+            for now, then in zip(nodes, self._old_nodes, strict=True)
+        )
+        moved = self.slave.maximum(float(np.nan_to_num(moved, nan=np.inf)))
+        return self._search + self._deep + (moved if moved < WILD * self._margin else 0.0)
+
+    def _entered(self, hits: Hits) -> NDArray[np.bool_]:
+        """Which partners are in front of their points, near them, or behind because the points have come into the body.
+
+        What a ray meets far behind its point may else be the far side of a thin body.
+        """
+        far = hits.gap < -self._search
+        rows = np.flatnonzero(far & ~self._met[hits.points])
+        values = self.master.shape.values(hits.xi[rows])[0]
+        before = np.einsum("nb,nbi->ni", values, self._old_nodes[1][hits.facets[rows]]) - self._old.x[hits.points[rows]]
+        gap = np.einsum("ni,ni->n", before, self._old.frames[hits.points[rows], 0])
+        keep = np.ones(len(far), dtype=bool)
+        keep[rows] = gap >= -self._search
+        return keep
+
+    def _moved(self, nodes: tuple[Array, Array], reach: float) -> bool:
         """Whether rays may have come nearer to other facets than the margin since these were last searched."""
         slave, master = (np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, self._seen, strict=True))
-        farther = max(self.search - self._seen_search, 0.0)
+        farther = max(reach - self._seen_reach, 0.0)
         total = self.slave.maximum(float(np.nan_to_num(slave + master + farther, nan=np.inf)))
         return self._margin < total < WILD * self._margin
 
-    def _look_around(self, points: Points, nodes: tuple[Array, Array]) -> None:
+    def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float) -> None:
         """Find the facets that are near each other."""
-        count, ray = len(self.tables[0]), self.search * points.frames[:, 0]
+        count, ray = len(self.tables[0]), reach * points.frames[:, 0]
         shape = len(nodes[0]), count, points.x.shape[-1]
         rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
         self.near = near_facets(rays, nodes[1], self._margin)
-        self._seen, self._seen_search = nodes, self.search
+        self._seen, self._seen_reach = nodes, reach
         self.version += 1

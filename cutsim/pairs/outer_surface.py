@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.fields.sizes import incidence
+from cutsim.pairs.overlap import inside_body
 from cutsim.pairs.pairing import Array, Indices, Shape
 
 
@@ -61,6 +62,10 @@ class OuterSurface:
         """Largest of one value a rank. Collective."""
         return float(self.V.mesh.comm.allreduce(value, op=MPI.MAX))
 
+    def total(self, count: int) -> int:
+        """Sum of one number a rank. Collective."""
+        return int(self.V.mesh.comm.allreduce(count, op=MPI.SUM))
+
 
 class Master(Protocol):
     """A surface that points find, of which every rank knows all facets. Every method is collective.
@@ -80,6 +85,9 @@ class Master(Protocol):
 
     def gather(self, values: Array) -> Array:
         """Values on the facets, shape (facets, nodes, components), of an array over the local dofs of each rank."""
+
+    def holds(self, points: Array, slave: OuterSurface) -> NDArray[np.bool_]:
+        """Which points, on the facets of another surface, are in its body in the reference configuration."""
 
 
 class SharedSurface:
@@ -118,6 +126,11 @@ class SharedSurface:
         everything: Array = np.empty(int(self._counts.sum()))
         self._comm.Allgatherv(mine, [everything, self._counts])
         return everything.reshape(-1, self._components)[self._places]
+
+    def holds(self, points: Array, slave: OuterSurface) -> NDArray[np.bool_]:
+        """Which points, on the facets of another surface, are in its body in the reference configuration."""
+        cells = np.repeat(slave.cells, len(points) // max(len(slave.cells), 1))
+        return inside_body(self.surface.V.mesh, points, cells, self.surface.cells)
 
 
 def normals(tangents: Array) -> Array:

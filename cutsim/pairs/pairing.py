@@ -65,6 +65,10 @@ class Hits:
     xi: Array
     gap: Array
 
+    def some(self, rows: NDArray[np.bool_]) -> "Hits":
+        """Some of them."""
+        return Hits(self.points[rows], self.facets[rows], self.xi[rows], self.gap[rows])
+
 
 def near_facets(rays: Array, master: Array, margin: float) -> tuple[Indices, Indices]:
     """Pairs of facets of two surfaces that are near each other.

@@ -40,6 +40,7 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         stick: If given, augmentation until no sticking facet slides more than this in a step, in the mean [length].
         two_pass: Whether each surface is slave once.
         search: Largest distance of a partner, on either side [length]; by default the mean size of the slave facets.
+            Points that lie in the other body from the start, or come into it in a step, find theirs at any depth.
         name: Name in messages and output.
 
     Attributes:
@@ -50,7 +51,8 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         normal_size: Mean size of the cells normal to the slave surface, the h of the penalty [length].
 
     Raises:
-        ValueError: A parameter is outside its range, a surface has no facets, or both share a facet.
+        ValueError: A parameter is outside its range, a surface has no facets, both share a facet, or points lie in the
+            other body from the start without facing its surface.
     """
 
     symmetric = False

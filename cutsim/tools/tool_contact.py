@@ -10,7 +10,7 @@ from dolfinx import fem
 from cutsim.base.assembly import integrate, moment, nodal_forces, resultant
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps, form
-from cutsim.base.kinematics import Expr, tangential
+from cutsim.base.kinematics import Expr, cofactor, tangential
 from cutsim.base.parameters import with_constants
 from cutsim.base.signatures import checked
 from cutsim.base.verdict import Verdict
@@ -20,6 +20,7 @@ from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
+from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import Path, Shape, check_directions
 
@@ -62,6 +63,7 @@ class Patch:
         self._normal_size = surface.points.mean(normal_size(state.mesh, surface.points.facets))
         self._pressure = self._contact.pressure(self._penetration)
         self.thrust = -self._pressure * normal
+        self._facing = ufl.dot(surface.restrict(_outward(state)), normal)
         self.slip: SlipHistory | None = None
         if friction is not None:
             self.slip = SlipHistory(
@@ -94,15 +96,37 @@ class Patch:
 
     @cached_property
     def _evaluate(self):  # type: ignore[no-untyped-def]
-        return self.surface.points.evaluator({"pressure": self._pressure})
+        return self.surface.points.evaluator(
+            {"pressure": self._pressure, "depth": self._penetration, "facing": self._facing}
+        )
+
+    def contact(self) -> dict[str, Values]:
+        """Present contact at the points. Collective.
+
+        Returns:
+            "pressure" [stress]; "depth" inside the tool [length]; "facing", the cosine between the normals of body and
+            tool: −1 where they look at each other, > 0 where the tool would push the body outwards.
+        """
+        values: dict[str, Values] = self._evaluate()
+        return values
 
     def pressure(self) -> Values:
         """Present contact pressure at the points [stress]. Collective."""
-        return self._evaluate()["pressure"]
+        return self.contact()["pressure"]
 
     def dissipation(self) -> Values:
         """Friction dissipation of the trial step at the points [energy per reference area]."""
         return np.zeros_like(self.surface.points.weights) if self.slip is None else self.slip.dissipation()
+
+
+def _outward(state: State) -> Expr:
+    """Current unit normal of the body on its surface."""
+    N, gdim = ufl.FacetNormal(state.mesh), state.mesh.geometry.dim
+    turned = cofactor(state.deformation_gradient(state.u)) * ufl.as_vector(
+        [*(N[i] for i in range(gdim)), *[0] * (3 - gdim)]
+    )
+    normal = ufl.as_vector([turned[i] for i in range(gdim)])
+    return normal / ufl.sqrt(ufl.dot(normal, normal))
 
 
 class ToolContact(RigidTool):
@@ -123,7 +147,8 @@ class ToolContact(RigidTool):
         patches: The tool on each surface.
 
     Raises:
-        ValueError: No surface is given, or the path has another dimension than the mesh.
+        ValueError: No surface is given, path or shape have another dimension than the mesh, or the tool begins so deep
+            in the body that it would come out on the far side.
     """
 
     @checked
@@ -148,6 +173,7 @@ class ToolContact(RigidTool):
         self.patches = tuple(Patch(state, s, shape, self.position, contact, law, temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
+        self._passing = Passing(self, self.patches)
 
     @property
     def entity_maps(self) -> EntityMaps:
@@ -162,6 +188,10 @@ class ToolContact(RigidTool):
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of pressure and friction on the body."""
         return sum((p.virtual_work(v) for p in self.patches), start=ufl.Form([]))
+
+    def objection(self) -> str | None:
+        """Whether the tool has passed through the surface of the body within the step, in words. Collective."""
+        return self._passing.objection()
 
     def evaluate(self) -> None:
         """Contact forces, slip and friction work of the trial state. Collective."""
@@ -195,6 +225,7 @@ class ToolContact(RigidTool):
     def commit(self) -> None:
         """Adopt position, forces and slip."""
         super().commit()
+        self._passing.commit()
         for slip in self.slips:
             slip.commit()
 

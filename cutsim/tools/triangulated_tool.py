@@ -20,6 +20,7 @@ from cutsim.interface.slip import SlipHistory
 from cutsim.pairs.kinematics import PairKinematics
 from cutsim.pairs.law import PairLaws
 from cutsim.pairs.outer_surface import OuterSurface
+from cutsim.pairs.overlap import inside_surface
 from cutsim.pairs.pairing import Array, Indices, Shape
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
 from cutsim.tools.rigid_tool import RigidTool
@@ -52,6 +53,10 @@ class RigidSurface:
         """Zero: the surface has no unknowns."""
         return np.zeros_like(self._corners)
 
+    def holds(self, points: Array, slave: OuterSurface) -> NDArray[np.bool_]:
+        """Which points are in the tool at the start."""
+        return inside_surface(points, self.reference)
+
 
 class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
     """Contact between a rigid tool of triangles and an outer surface of the body.
@@ -66,7 +71,7 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
         path: Motion of the reference point.
         contact: Contact law; the pressure acts per reference area.
         friction: Friction law, None for none; without a tangential penalty of its own it takes that of the contact law.
-        search: Largest distance of a partner, on either side, beyond what the tool moves in the step [length]; by
+        search: Largest distance of a partner, on either side, beyond what has moved in the step [length]; by
             default the mean size of the facets.
         name: Name in messages and output.
 
@@ -96,10 +101,9 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
         points = slave_points(state, facets, state.measures.exterior(facets))
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, self.position, self._position_old)
-        self._search = search or size
         self._normal_size = points.mean(normal_size(state.mesh, points.facets))
         slave = OuterSurface(state.V, points.facets)
-        kinematics = PairKinematics(slave, master, fixed=False, search=self._search, size=size)
+        kinematics = PairKinematics(slave, master, fixed=False, search=search or size, size=size)
         laws = PairLaws(None, contact, friction, None, None)
         self.touch = SurfacePass(state, points, kinematics, laws, weight=1.0)
         self.passes = (self.touch,)
@@ -118,8 +122,6 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
     def begin(self, time: float) -> None:
         """Move the tool; the slide of the step counts from the committed displacement."""
         super().begin(time)
-        # at first the body has not given way: it is in the tool as deep as that has moved
-        self.touch.kinematics.search = self._search + float(np.linalg.norm(self.displacement))
         self.touch.begin()
 
     def evaluate(self) -> None:

@@ -1,0 +1,105 @@
+"""Whether a rigid tool has come through the surface of the body to its inner side, where it would push outwards."""
+
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutsim.base.log import collective_logger
+from cutsim.fields.points import Surface, Values
+from cutsim.tools.rigid_tool import RigidTool
+
+logger = collective_logger(__name__)
+
+# cosine between the normals of body and tool from which the tool is behind the surface of the body
+_BEHIND = 0.5
+# change of this cosine in a step that is a jump to the other side of the tool
+_TURN = 0.5
+# times of a step at which a tool that has come behind the surface is looked for in it
+_SAMPLES = 50
+
+
+class Touched(Protocol):
+    """A surface of the body that a tool may touch.
+
+    Attributes:
+        surface: Its points.
+    """
+
+    surface: Surface
+
+    def contact(self) -> Mapping[str, Values]:
+        """Present "depth" of the points in the tool and "facing" of its normal and theirs. Collective."""
+
+
+class Passing:
+    """Watches on which side of the surfaces a tool is. Every method is collective.
+
+    Args:
+        tool: The tool, at the start of its path.
+        patches: The surfaces.
+
+    Raises:
+        ValueError: The tool begins so deep in the body that it would come out on the far side.
+    """
+
+    def __init__(self, tool: RigidTool, patches: Sequence[Touched]) -> None:
+        self._tool, self._patches = tool, patches
+        self._seen = self._seen_old = [p.contact() for p in patches]
+        if count := self._count([_pushed(now) for now in self._seen]):
+            depth = max(p.surface.points.maximum(now["depth"]) for p, now in zip(patches, self._seen, strict=True))
+            raise ValueError(
+                f"path of {tool.name!r}: at its start {count} points of the body lie behind the middle of the tool, up "
+                f"to {depth:.3g} deep in it, from where it would push them outwards; let it begin outside the body, or "
+                "less deep in it"
+            )
+        nearest, facing = max(own for p, now in zip(patches, self._seen, strict=True) for own in _nearest(p, now))
+        if facing > _BEHIND and nearest < 0:
+            logger.warning(
+                "%s begins %.3g behind the nearest point of what it can touch: inside the body, or beyond it",
+                tool.name, -nearest,
+            )  # fmt: skip
+
+    def objection(self) -> str | None:
+        """In words, whether the tool has come through the surface in this step; None if it has not."""
+        self._seen = [p.contact() for p in self._patches]
+        both = list(zip(self._seen_old, self._seen, strict=True))
+        # a rim that friction folds turns slowly, step by step, and is left alone
+        pushed = [_pushed(now) & (now["facing"] - then["facing"] > _TURN) for then, now in both]
+        turned = [(then["facing"] < -_BEHIND) & (now["facing"] > _BEHIND) for then, now in both]
+        if self._count(turned):
+            pushed = [p | t for p, t in zip(pushed, self._met(turned), strict=True)]
+        count = self._count(pushed)
+        return f"{self._tool.name} has passed through the surface of the body at {count} points" if count else None
+
+    def commit(self) -> None:
+        """Adopt the trial step."""
+        self._seen_old = self._seen
+
+    def _met(self, some: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
+        """Which of some points have been in the tool during the step."""
+        tool, state = self._tool, self._tool.state
+        end, met = state.u.x.array.copy(), [np.zeros_like(points) for points in some]
+        for s in np.linspace(0.0, 1.0, _SAMPLES + 1)[1:]:
+            state.u.x.array[:] = state.u_old.x.array + s * (end - state.u_old.x.array)
+            tool.position.value[:] = tool.path.position(state.time_old + s * (state.time - state.time_old))
+            inside = [patch.contact()["depth"] > 0 for patch in self._patches]
+            met = [before | (points & now) for before, points, now in zip(met, some, inside, strict=True)]
+        state.u.x.array[:] = end
+        return met
+
+    def _count(self, points: Sequence[NDArray[np.bool_]]) -> int:
+        return sum(p.surface.points.count(where) for p, where in zip(self._patches, points, strict=True))
+
+
+def _nearest(patch: Touched, contact: Mapping[str, Values]) -> list[tuple[float, float]]:
+    """Depth of the deepest point of each rank in the tool, and how it faces it. Collective."""
+    depth, facing = contact["depth"].ravel(), contact["facing"].ravel()
+    own = (float(depth.max(initial=-np.inf)), float(facing[depth.argmax()]) if len(depth) else -1.0)
+    return patch.surface.points.submesh.comm.allgather(own)
+
+
+def _pushed(contact: Mapping[str, Values]) -> NDArray[np.bool_]:
+    """Points that the tool pushes outwards."""
+    return np.asarray((contact["facing"] > _BEHIND) & (contact["depth"] > 0))
