@@ -9,6 +9,7 @@ from mpi4py import MPI
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.assembly import moment
+from cutsim.base.verdict import Verdict
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
@@ -18,7 +19,7 @@ from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path, Plane
-from cutsim.tools.tool_contact import ToolContact, warn_coarse
+from cutsim.tools.tool_contact import ToolContact, doubt_size
 
 CONTACT = PenaltyContact(60.0, blend=0.01)
 FRICTION = SmoothCoulomb(0.3, 1e-3)
@@ -188,8 +189,9 @@ def test_a_tool_may_not_begin_behind_the_surface(depth, caplog):
 
 
 def test_coarse_mesh_is_named_with_numbers(caplog):
-    blade = Blade(0.2, 0.05, 0.5)
-    warn_coarse("blade", blade, 0.05)
-    assert not caplog.records
-    warn_coarse("blade", blade, 0.2)
-    assert "0.2" in caplog.text and "0.05" in caplog.text
+    blade, verdict = Blade(0.2, 0.05, 0.5), Verdict()
+    doubt_size(verdict, "blade", blade, 0.05, 10.0)
+    assert not caplog.records and verdict.trusted
+    doubt_size(verdict, "blade", blade, 0.2, 10.0)
+    assert MPI.COMM_WORLD.rank or ("0.2" in caplog.text and "0.05" in caplog.text)
+    assert not verdict.trusted

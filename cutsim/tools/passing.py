@@ -6,11 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cutsim.base.log import collective_logger
 from cutsim.fields.points import Surface, Values
 from cutsim.tools.rigid_tool import RigidTool
-
-logger = collective_logger(__name__)
 
 # cosine between the normals of body and tool from which the tool is behind the surface of the body
 _BEHIND = 0.5
@@ -56,10 +53,11 @@ class Passing:
             )
         nearest, facing = max(own for p, now in zip(patches, self._seen, strict=True) for own in _nearest(p, now))
         if facing > _BEHIND and nearest < 0:
-            logger.warning(
-                "%s begins %.3g behind the nearest point of what it can touch: inside the body, or beyond it",
-                tool.name, -nearest,
-            )  # fmt: skip
+            tool.state.verdict.doubt(
+                f"{tool.name}: start",
+                f"{tool.name} begins {-nearest:.3g} behind the nearest point of what it can touch: inside the body, or "
+                "beyond it",
+            )
 
     def objection(self) -> str | None:
         """In words, whether the tool has come through the surface in this step; None if it has not."""

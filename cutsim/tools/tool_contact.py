@@ -86,13 +86,9 @@ class Patch:
         """Energy of the contact penalty."""
         return self._contact.energy(self._penetration) * self.surface.measure
 
-    @cached_property
-    def _depths(self):  # type: ignore[no-untyped-def]
-        return self.surface.points.evaluator({"depth": self._penetration})
-
     def penetration(self) -> float:
         """Largest depth of a point in the tool over the mesh size normal to the surface, < 0 outside. Collective."""
-        return self.surface.points.maximum(self._depths()["depth"]) / self._normal_size
+        return self.surface.points.maximum(self.contact()["depth"]) / self._normal_size
 
     @cached_property
     def _evaluate(self):  # type: ignore[no-untyped-def]
