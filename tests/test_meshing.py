@@ -302,6 +302,26 @@ def test_groups_overlap_and_nodes_have_any_numbers(tmp_path, ending):
     assert measure(tagged.mesh, "dS", tagged.facets("half")) == pytest.approx(0.25)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_curved_cells_keep_their_groups(tmp_path, dim):
+    """A disc or cylinder of second order: its area and that of its rim are those of the circle to 1e-4."""
+
+    def draw():
+        occ = gmsh.model.occ
+        body = occ.addDisk(0, 0, 0, 1, 1) if dim == 2 else occ.addCylinder(0, 0, 0, 0, 0, 1, 1)
+        occ.synchronize()
+        rim = gmsh.model.getEntities(dim - 1)[0][1]
+        gmsh.model.addPhysicalGroup(dim, [body], name="body")
+        gmsh.model.addPhysicalGroup(dim - 1, [rim], name="rim")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.model.mesh.generate(dim)
+
+    tagged = read_msh(drawn(tmp_path / "round.msh", draw), COMM, gdim=dim)
+    assert measure(tagged.mesh, "dx", tagged.cells("body")) == pytest.approx(np.pi, rel=3e-4)
+    assert measure(tagged.mesh, "ds", tagged.facets("rim")) == pytest.approx(2 * np.pi, rel=3e-4)
+
+
 def test_formats_without_groups_are_refused(tmp_path):
     for ending in ("inp", "vtk", "feb", "geo"):
         with pytest.raises(ValueError, match=rf"mesh.{ending}: gmsh reads no groups .* allowed are .msh, .med"):

@@ -230,7 +230,9 @@ def _facets(mesh: Mesh, corners: NDArray[np.int64]) -> NDArray[np.int32]:
     facets = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
     if not len(facets):  # entities_to_geometry of dolfinx 0.9 divides by their number
         return facets
-    here = mesh.geometry.input_global_indices[entities_to_geometry(mesh, tdim - 1, facets)]
+    # of curved facets the corners come before the other nodes
+    nodes = entities_to_geometry(mesh, tdim - 1, facets)[:, : corners.shape[1]]
+    here = mesh.geometry.input_global_indices[nodes]
     # rows are compared where all corners are among those wanted: few
     near = np.isin(here, corners).all(axis=1)
     return facets[near][gmsh_model.rows_in(np.sort(here[near], axis=1), np.sort(corners, axis=1))]
