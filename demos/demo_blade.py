@@ -14,15 +14,15 @@
 #
 # **The fracture energy.**  The thesis prints a strength of 0.615 MPa with an opening of 0.0061 mm, which gives
 # $G_c = e\,t_n\,\varepsilon = 0.0103$ N/mm, and it also prints $G_c = 277.9$ N/mm.  A steady frictionless cut
-# needs the force $F = G_c\,w$ on an edge of length $w$: 0.1 N for the one and 2800 N for the other, where 9–10 N
-# were measured over $w = 10.1$ mm.  The default is therefore $G_c = 0.8$ N/mm: 8.1 N for the fracture alone,
-# which leaves room for friction.
+# needs the force $F = G_c\,w$ on an edge of length $w$: 0.1 N for the one and 2800 N for the other, over $w = 10.1$ mm.
+# The force that was measured is not printed; the machine was set to a largest load of 9–10 N.  The default is
+# $G_c = 0.8$ N/mm: 8.1 N for the fracture alone, which leaves room for friction below that load.
 #
-# **What is recovered.**  A tall block reaches a steady cut, in which $F/w$ itself is the toughness.  A thin specimen
-# does not: there the toughness follows from a balance of work, as from a testing machine's curve,
-# $G = (\int F\,\mathrm{d}s - \Delta E - \text{losses})/\Delta A$ with the elastic energy $E$ of body and
-# contact, friction and viscosity as losses, and $A$ the cut area, in which a point counts by the share of the work
-# of separation that belongs to its opening.  Both come from the force on the tool, not from the cohesive law's books.
+# **What the force tells.**  A tall block (`--dim 2`) reaches a steady cut, in which $F/w$ itself is the toughness but
+# for the compression of the block below; the demo `steady_cut` has that in space too.  This thin specimen does not
+# become steady.  What its energy audit leaves for the crack, $(\int F\,\mathrm{d}s - \Delta E -
+# \text{losses})/\Delta A$, is the toughness that was put in as soon as the books close: the summary has it as a check
+# of the books, not as a result.
 
 import logging
 import time
@@ -42,7 +42,7 @@ from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
 from cutsim.studies.insertion import Insertion, ThermalCut
-from cutsim.studies.insertion_work import recovered_toughness
+from cutsim.studies.insertion_work import audited_toughness, steady_force
 
 MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
 
@@ -112,7 +112,7 @@ def main(
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/blade"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
-    """Push a rigid wedge blade through silicone and recover the fracture energy from the force."""
+    """Push a rigid wedge blade through silicone."""
     level = logging.WARNING if MPI.COMM_WORLD.rank == 0 else logging.ERROR
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
     claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
@@ -181,6 +181,9 @@ def push(
     history = recording.columns()
     draw(cut, history, law, out, problem.fields.get("temperature"))
     summary = summarise(cut, history, law, time.perf_counter() - begun)
+    if dim == 2:
+        section = 2 * setting.mesh["Lx"] * young / (1 - poisson**2)
+        summary["steady_force_per_width"] = steady_force(law.toughness[0], 1.0, section)
     recording.summary(summary)
     return summary
 
@@ -197,7 +200,7 @@ def summarise(cut: Insertion, history: History, law: Exponential, seconds: float
     late = depth >= end - 0.5 * (end - cut.tip)
     summary: Summary = {
         "toughness_given": law.toughness[0],
-        "toughness_recovered": recovered_toughness(history, cut.tip + 0.4 * (end - cut.tip), end, cut.whole),
+        "toughness_in_the_books": audited_toughness(history, cut.tip + 0.4 * (end - cut.tip), end, cut.whole),
         "mean_force_per_width_second_half": float(np.trapezoid(force[late], depth[late]) / np.ptp(depth[late])) / width,
         "largest_force": float(force.max()),
         "depth": end,
@@ -226,7 +229,7 @@ def draw(cut: Insertion, history: History, law: Exponential, out: Path, temperat
     dim = cut.state.mesh.geometry.dim
     width = 1.0 if dim == 2 else WIDTH
     if cut.state.mesh.comm.rank == 0:
-        expected = {"steady frictionless cut, $G_c w$": law.toughness[0] * width}
+        expected = {"$G_c w$": law.toughness[0] * width}
         plot_curves(
             out / "force.png",
             [Curve(history["depth"], history["force"], "force on the blade")],
@@ -275,19 +278,19 @@ def cut_height(cut: Insertion) -> float:
 
 
 # With friction above the tangent of the half angle, 0.2, the faces stick to the blade and are dragged along: little is
-# cut, and the toughness is then a small difference of large works that nobody should read off.
+# cut, and what the books leave for the crack is then a small difference of large works.
 
 
 def check(summary: Summary, friction: float, *, steady: bool) -> None:
     """The headline numbers, asserted."""
-    given, recovered = summary["toughness_given"], summary["toughness_recovered"]
+    given, booked = summary["toughness_given"], summary["toughness_in_the_books"]
     if friction < np.tan(HALF_ANGLE):
-        assert abs(recovered / given - 1) < 0.03, f"recovered {recovered}, given {given}"
+        assert abs(booked / given - 1) < 0.03, f"{booked} in the books, given {given}"
     assert summary["largest_closure"] < 0.01
     assert summary["largest_imbalance"] < 1e-6
     assert summary.get("largest_heat_closure", 0.0) < 1e-6
     if steady:
-        assert abs(summary["mean_force_per_width_second_half"] / given - 1) < 0.02
+        assert abs(summary["mean_force_per_width_second_half"] / summary["steady_force_per_width"] - 1) < 0.01
 
 
 if __name__ == "__main__":

@@ -481,6 +481,19 @@ def test_a_thin_layer_that_can_be_compressed_is_a_bed_of_springs():
     assert np.diff(equivalent)[0] == pytest.approx(5.0, rel=0.01)
 
 
+def test_a_layer_that_slides_on_its_base_is_softer_than_one_that_is_bonded():
+    """Thin and not bonded it is a bed of springs of modulus E/(1−ν²), so κ grows by π/2 per a/h, whatever ν."""
+    slope = (layer_factor(10.0, 0.3, bonded=False) - layer_factor(5.0, 0.3, bonded=False)) / 5
+    assert slope == pytest.approx(np.pi / 2, rel=1e-3)
+    assert layer_factor(0.5, 0.5, bonded=False) == layer_factor(0.5, 0.1, bonded=False)
+    assert layer_factor(1e-9, 0.5, bonded=False) == pytest.approx(1.0, abs=1e-8)
+    for aspect in (0.2, 1.0, 3.0):
+        assert 1 < layer_factor(aspect, 0.4, bonded=False) < layer_factor(aspect, 0.4)
+    depth = np.linspace(0.0, 0.4, 20)
+    force = punch_force(depth, 2.0, 1.6, 0.41, 4.2, bonded=False)
+    assert fit_shear_modulus(depth, force, 1.6, 0.41, 4.2, bonded=False).values["shear"] == pytest.approx(2.0)
+
+
 def test_shear_modulus_from_a_curve():
     """Modulus 2 recovered with its interval, whatever the origin of the depth."""
     depth = np.linspace(1.0, 1.4, 40)

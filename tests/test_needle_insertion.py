@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from cutsim import Blade, Exponential, Needle, NeoHookean, StepControl, read_geo, run
 from cutsim.studies.insertion import Insertion
-from cutsim.studies.insertion_work import TwoInsertions, force_parts, recovered_toughness
+from cutsim.studies.insertion_work import TwoInsertions, audited_toughness, force_parts
 from cutsim.tools.tool_parts import PARTS
 
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -43,7 +43,7 @@ def split(*, friction=0.0, turn=None):
     law = Exponential.from_parameters(strength=0.6, toughness=0.2)
     blade = Blade(np.radians(20), 0.1, 0.6)
     material = NeoHookean(YOUNG, 0.45)
-    return Insertion.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=0.002, turn=turn)
+    return Insertion.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=5e-4, turn=turn)
 
 
 def drive(cut, until, control):
@@ -164,10 +164,10 @@ def test_friction_of_the_tip_adds_to_the_apparent_toughness():
     assert apparent[1] / apparent[0] == pytest.approx(1 + FRICTION / np.tan(np.radians(20)), rel=0.15)
 
 
-def test_a_planar_crack_takes_its_toughness():
+def test_a_planar_crack_keeps_its_books():
     cut, history = in_space()
     pushed = history["depth"] > cut.tip
-    assert recovered_toughness(history, 1.2, 1.8, cut.whole) == pytest.approx(0.15, rel=0.05)
+    assert audited_toughness(history, 1.2, 1.8, cut.whole) == pytest.approx(0.15, rel=0.05)
     sides = history["needle_right_force_x"] + history["needle_left_force_x"]
     assert np.abs(sides).max() < 1e-4 * history["force"].max()
     assert np.abs(history["energy_closure"][pushed]).max() < 0.01

@@ -101,6 +101,16 @@ class FacetPoints:
         owned = slice(0, self._owned)
         return float(self.submesh.comm.allreduce((values * self.weights)[owned].sum(), op=MPI.SUM))
 
+    def area_above(self, values: Values, level: float) -> float:
+        """Area where point values exceed a level, the edge of it placed within the facets. Collective."""
+        share = (self.weights.T / self.weights.sum(axis=1)).T
+        mean = (share * values).sum(axis=1, keepdims=True)
+        # a linear function on a segment, or along a side of a rectangle, has this range
+        spread = np.sqrt(12 * (share * (values - mean) ** 2).sum(axis=1, keepdims=True))
+        own = spread * share ** (1 / self.submesh.topology.dim)
+        steep = 1e-12 * np.maximum(np.abs(values), abs(level)) + np.finfo(float).tiny
+        return self.integral(np.clip(0.5 + (values - level) / np.maximum(own, steep), 0.0, 1.0))
+
     def maximum(self, values: Values) -> float:
         """Largest point value, −∞ if there is no point. Collective."""
         return float(self.submesh.comm.allreduce(float(values[: self._owned].max(initial=-np.inf)), op=MPI.MAX))

@@ -41,11 +41,11 @@ def poisson_ratio(pairs: Sequence[tuple[ArrayLike, ArrayLike]]) -> tuple[float, 
 
 
 def punch_force(
-    depth: ArrayLike, shear: float, radius: float, poisson: float, thickness: float = np.inf
+    depth: ArrayLike, shear: float, radius: float, poisson: float, thickness: float = np.inf, *, bonded: bool = True
 ) -> NDArray[np.float64]:
     """Force on a flat-ended, frictionless, rigid cylinder, P = 4 G a d κ/(1−ν) (Sneddon 1965, thesis 3.2).
 
-    κ is the factor of a layer bonded to a rigid base (`layer_factor`).
+    κ is the factor of a layer on a rigid base (`layer_factor`).
 
     Args:
         depth: Depth d of indentation [length].
@@ -53,17 +53,25 @@ def punch_force(
         radius: Radius a of the punch > 0 [length].
         poisson: Poisson's ratio, −1 < ν ≤ ½ [–].
         thickness: Thickness h > 0 of the layer [length]; a half space by default.
+        bonded: Whether the layer is bonded to its base; else it slides on it without friction.
 
     Raises:
         ValueError: A number is outside its range.
     """
     require_number("radius", radius, positive)
     require_number("thickness", thickness, positive.or_inf)
-    return 4 * shear * radius * layer_factor(radius / thickness, poisson) / (1 - poisson) * np.asarray(depth)
+    factor = layer_factor(radius / thickness, poisson, bonded=bonded)
+    return 4 * shear * radius * factor / (1 - poisson) * np.asarray(depth)
 
 
 def fit_shear_modulus(
-    depth: ArrayLike, force: ArrayLike, radius: float, poisson: float, thickness: float = np.inf
+    depth: ArrayLike,
+    force: ArrayLike,
+    radius: float,
+    poisson: float,
+    thickness: float = np.inf,
+    *,
+    bonded: bool = True,
 ) -> Fit:
     """Shear modulus from the force on a flat-ended cylinder against its depth.
 
@@ -75,6 +83,7 @@ def fit_shear_modulus(
         radius: Radius a of the punch > 0 [length].
         poisson: Poisson's ratio, −1 < ν ≤ ½ [–].
         thickness: Thickness h > 0 of the layer [length]; a half space by default.
+        bonded: Whether the layer is bonded to its base; else it slides on it without friction.
 
     Returns:
         Fit of ``shear`` [stress] and ``offset``, the force at depth zero [force].
@@ -84,37 +93,42 @@ def fit_shear_modulus(
     """
     d, P = np.asarray(depth, dtype=np.float64), np.asarray(force, dtype=np.float64)
     require_pairs("depth", d, "force", P)
-    unit = punch_force(d, 1.0, radius, poisson, thickness)
+    unit = punch_force(d, 1.0, radius, poisson, thickness, bonded=bonded)
     guess = {"shear": float(np.ptp(P) / np.ptp(unit)), "offset": float(np.abs(P).max())}
     return fit_model(lambda values: values["shear"] * unit + values["offset"], guess, P)
 
 
-def layer_factor(aspect: float, poisson: float) -> float:
-    """Factor κ by which a layer bonded to a rigid base is stiffer than a half space, under a flat-ended cylinder.
+def layer_factor(aspect: float, poisson: float, *, bonded: bool = True) -> float:
+    """Factor κ by which a layer on a rigid base is stiffer than a half space, under a flat-ended cylinder.
 
     κ = ∫₀¹ φ dx, where φ solves Fredholm's equation of the second kind (Hayes, Keer, Herrmann and Mockros 1972;
     Lebedev and Ufliand 1958), here by Gauss's quadrature,
 
     φ(x) − (a/h)/π ∫₀¹ φ(y) [K(x+y) + K(x−y)] dy = 1,  K(u) = ∫₀^∞ M(ξ) cos(ξ u a/h) dξ,
-    M = 1 − [2k sinh 2ξ − 4ξ]/[2k cosh 2ξ + 4ξ² + 1 + k²],  k = 3 − 4ν.
+    M = 1 − [2k sinh 2ξ − 4ξ]/[2k cosh 2ξ + 4ξ² + 1 + k²],  k = 3 − 4ν,  of a layer bonded to the base,
+    M = 1 − [cosh 2ξ − 1]/[sinh 2ξ + 2ξ],  whatever ν,  of one that slides on it without friction.
 
     Args:
         aspect: Radius of the punch over thickness of the layer, a/h, in [0, 10].
         poisson: Poisson's ratio, −1 < ν ≤ ½.
+        bonded: Whether the layer is bonded to its base; else it slides on it without friction.
 
     Raises:
         ValueError: A number is outside its range.
     """
     require_number("aspect", aspect, between(0, 10, "[]"))
     require_number("poisson", poisson, between(-1, 0.5, "(]"))
-    return _layer_factor(aspect, poisson, *_gauss(_NODES, 1.0))
+    return _layer_factor(aspect, poisson if bonded else None, *_gauss(_NODES, 1.0))
 
 
-def _layer_factor(aspect: float, poisson: float, x: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
-    """The factor with a quadrature rule on [0, 1]."""
-    k = 3 - 4 * poisson
+def _layer_factor(aspect: float, poisson: float | None, x: NDArray[np.float64], weights: NDArray[np.float64]) -> float:
+    """The factor with a quadrature rule on [0, 1]; without Poisson's ratio, of a layer that slides on its base."""
     xi, measure = _gauss(_POINTS, _END)
-    M = 1 - (2 * k * np.sinh(2 * xi) - 4 * xi) / (2 * k * np.cosh(2 * xi) + 4 * xi**2 + 1 + k**2)
+    if poisson is None:
+        M = 1 - (np.cosh(2 * xi) - 1) / (np.sinh(2 * xi) + 2 * xi)
+    else:
+        k = 3 - 4 * poisson
+        M = 1 - (2 * k * np.sinh(2 * xi) - 4 * xi) / (2 * k * np.cosh(2 * xi) + 4 * xi**2 + 1 + k**2)
     # cos(x+y) + cos(x−y) = 2 cos x cos y
     waves = np.cos(aspect * np.outer(x, xi))
     kernel = 2 * aspect / np.pi * (waves * (M * measure)) @ waves.T

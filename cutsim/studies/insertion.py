@@ -238,21 +238,26 @@ class Insertion:
         return ThermoMechanics(self.mechanics, heat)
 
     def columns(self, columns: Columns) -> Columns:
-        """Depth of the tip, force of the whole tool, its imbalance with the plate, cut area; tip and shaft. Collective.
+        """Depth of the tip, force of the whole tool, its imbalance with the plate, areas; tip and shaft. Collective.
 
-        Forces are positive against the push.  The cut area counts each point of the crack by the share of its work of
-        separation that belongs to its opening.
+        Forces are positive against the push.  The area behind the front is that where the crack is open by more than
+        spends half the work of separation; the cut area counts each point by the share of that work that belongs to its
+        opening.
         """
         force = self.whole * sum(half.force()[1] for half in self.halves)
         reaction = self.whole * self.mechanics.reaction(self.plate)
         depth = -float(self.halves[0].position.value[1])
         imbalance = abs(reaction - force) / abs(force) if force else 0.0
-        cut = self.crack.points.integral(np.interp(self.crack.point_values("opening"), *self.separation))
+        points, opening = self.crack.points, self.crack.point_values("opening")
+        openings, spent = self.separation
+        cut = points.integral(np.interp(opening, openings, spent))
+        front = points.area_above(opening, float(np.interp(0.5, spent, openings)))
         rows: Columns = {
             "depth": (depth, "length"),
             "force": (force, "force"),
             "imbalance": (imbalance, "one"),
             "cut": (self.whole * cut, self.state.facet_measure),
+            "front": (self.whole * front, self.state.facet_measure),
         }
         for part in PARTS:
             rows[f"{part}_force"] = (self.whole * self.parts.force(part), "force")

@@ -4,7 +4,7 @@ All of it starts from the columns of a run of `cutsim.studies.insertion.Insertio
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,12 @@ Array = NDArray[np.float64]
 History = Mapping[str, Array]
 
 
-def recovered_toughness(history: History, start: float, end: float, whole: float) -> float:
-    """Toughness from a simulated curve by a balance of work, G = (∫F ds − ΔE − losses)/ΔA [force/length].
+def audited_toughness(history: History, start: float, end: float, whole: float) -> float:
+    """What the energy audit leaves for the crack, (∫F ds − ΔE − losses)/ΔA: a check of the books [force/length].
 
-    What the tool spends between two depths is taken from its force, not from the cohesive law: the external work less
-    the energy held by body and contact, and less friction and viscous losses; ΔA is the growth of the cut area.
+    ΔE is what body and contact hold, losses are friction and viscosity, and ΔA, the growth of the column `cut`, counts
+    each point by the share of its work that the cohesive law has spent.  If the audit closes, this is the toughness
+    that was put in, whatever the mechanics: it says nothing of the cut.  For that there is `SteadyCut`.
 
     Args:
         history: Columns of a run of `Insertion`.
@@ -44,6 +45,76 @@ def recovered_toughness(history: History, start: float, end: float, whole: float
     area = grown(history["cut"])
     require("depths", (start, end), area > 0, "such that the cut grows between them")
     return grown(spent) / area
+
+
+def steady_force(toughness: float, width: float, stiffness: float = np.inf) -> float:
+    """Force of a steady frictionless cut in a block that a smooth plate holds from below.
+
+    What is not yet cut carries the force to the plate and is shorter by ε = F/S: per way the tool cuts 1 + ε of bond,
+    and the block gives back ½ F ε.  So F (1 + ε/2) = G_c w (1 + ε).
+
+    Args:
+        toughness: G_c [force/length].
+        width: Length w of the cutting edge; 1 in plane strain [length].
+        stiffness: Axial stiffness S of the section below the cut: E A with free sides, E A/(1 − ν²) in plane strain
+            [force].
+    """
+    if np.isinf(stiffness):
+        return toughness * width
+    x = toughness * width / stiffness
+    return stiffness * (x - 1 + float(np.hypot(1, x)))
+
+
+@dataclass(frozen=True)
+class SteadyCut:
+    """A stretch of steady cut by its force and the front of its crack: nothing of it is from the law's books.
+
+    Between two steady states all that is stored moves along with the tool.  What the force has spent is then what the
+    area swept by the front has cost, and the block below gives back what it was compressed by.
+
+    Attributes:
+        force: Mean force [force].
+        drift: Change of the mean force from the first half of the stretch to the second, over the mean [–].
+        way: Way of the tool [length].
+        swept: Area swept by the front, in the reference configuration [area].
+    """
+
+    force: float
+    drift: float
+    way: float
+    swept: float
+
+    def toughness(self, stiffness: float = np.inf) -> float:
+        """Force × way over swept area, with what the compressed block gives back; frictionless [force/length].
+
+        Args:
+            stiffness: Axial stiffness of the section below the cut, as in `steady_force` [force].
+        """
+        return self.force * self.way * (1 + self.force / stiffness / 2) / self.swept
+
+    @classmethod
+    def of(cls, history: History, start: float, end: float) -> "SteadyCut":
+        """Evaluate the first push between two depths.
+
+        Args:
+            history: Columns of a run of `Insertion`.
+            start: Depth at which the cut has become steady [length].
+            end: A larger depth [length].
+
+        Raises:
+            ValueError: The front does not move between the two depths, or the run does not reach them.
+        """
+        pushed = _first_push(history["depth"])
+        depth = history["depth"][pushed]
+        inside = depth[0] <= start < end <= depth[-1] * (1 + 1e-9)
+        require("depths", (start, end), inside, f"in growing order within [{depth[0]:g}, {depth[-1]:g}]")
+        at = np.array([start, 0.5 * (start + end), end])
+        work = np.interp(at, depth, cumulative_trapezoid(history["force"][pushed], depth, initial=0.0))
+        swept = float(np.diff(np.interp([start, end], depth, history["front"][pushed]))[0])
+        require("depths", (start, end), swept > 0, "such that the front moves between them")
+        first, second = 2 * np.diff(work) / (end - start)
+        force = float(0.5 * (first + second))
+        return cls(force, float(second - first) / force, end - start, swept)
 
 
 def force_parts(history: History, whole: float, window: float) -> dict[str, Array]:
@@ -90,13 +161,15 @@ def force_parts(history: History, whole: float, window: float) -> dict[str, Arra
 class TwoInsertions:
     """Work of two insertions to the same depth, the second along the broken path (Azar and Hayward 2008).
 
-    The body ends in the same state both times, so that the difference is what was lost in the first insertion only.
+    The body ends in the same state both times, and begins without strain, but for what a tool that stands in the mouth
+    of a broken crack leaves in it: the difference is what was lost in the first insertion only.  The work of the first
+    has to count from before the tool is in the notch: the bond is whole then, and spreading the notch takes work.
 
     Attributes:
-        first: Work of the tool in the first push [energy].
+        first: Work of the tool from its entry into the notch to the end of the first push [energy].
         second: Work in the second push [energy].
-        losses: Friction and viscous work of the first push beyond that of the second [energy].
-        area: New crack area, each point by its damage.
+        losses: Friction and viscous work of the first insertion beyond that of the second [energy].
+        area: New crack area, each point by its damage, which its opening alone tells.
     """
 
     first: float
@@ -111,8 +184,13 @@ class TwoInsertions:
 
     @property
     def toughness(self) -> float:
-        """The same without the losses that the audit finds in excess in the first push [force/length]."""
+        """The same without the losses that the audit finds in excess in the first [force/length]."""
         return (self.first - self.second - self.losses) / self.area
+
+    def beyond(self, shallower: "TwoInsertions") -> "TwoInsertions":
+        """What this experiment adds to one of less depth: the fringe of half broken bond, in both, drops out."""
+        names = [field.name for field in fields(self)]
+        return TwoInsertions(*(getattr(self, name) - getattr(shallower, name) for name in names))
 
     @classmethod
     def of(cls, history: History, cut: Insertion) -> "TwoInsertions":
@@ -126,13 +204,17 @@ class TwoInsertions:
             ValueError: The tool does not turn, or the run ended before the second push did.
         """
         require("turn", cut.turn, cut.turn is not None, "a depth: the tool is to be pushed twice")
-        ends = [cut.time_of(depth, push) for push in (1, 2) for depth in (cut.tip, cut.turn or cut.tip)]
+        turn = cut.turn or cut.tip
+        ends = [0.0, *(cut.time_of(depth, push) for push, depth in ((1, turn), (2, cut.tip), (2, turn)))]
         time = history["time"]
         require("time", float(time[-1]), time[-1] >= ends[-1] * (1 - 1e-9), f">= {ends[-1]}, when the second push ends")
-        work = cumulative_trapezoid(history["force"], history["depth"], initial=0.0)
-        lost = cut.whole * (history["energy_friction"] + history["energy_viscous"])
-        works, losses = (np.diff(np.interp(ends, time, column))[::2] for column in (work, lost))
-        area = cut.whole * float(np.interp(ends[1], time, history["crack_broken"]))
+        time = np.append(0.0, time)
+        lost = history["energy_friction"] + history["energy_viscous"]
+        works, losses = (
+            cut.whole * np.diff(np.interp(ends, time, np.append(0.0, column)))[::2]
+            for column in (history["work_external"], lost)
+        )
+        area = cut.whole * float(np.interp(ends[1], history["time"], history["crack_broken"]))
         return cls(float(works[0]), float(works[1]), float(losses[0] - losses[1]), area)
 
 

@@ -1,0 +1,199 @@
+# # A steady cut: the toughness from force and front alone
+#
+# A balance of energy gives back the toughness that was put in, whatever the mechanics, as long as its books close.
+# What a simulated cut is worth shows where the law's books have no say: in the *force* on the tool, and in the *place*
+# of the crack front.
+#
+# ## What is known
+#
+# A strip stands on a smooth plate, its sides are free.  A rigid smooth blade splits it along its middle.  Once the cut
+# is steady everything that is stored moves along with the tool, and the force per width of the edge is the toughness,
+#
+# $$ F = G_c\,w, $$
+#
+# but for one thing: what is not yet cut carries the force down to the plate and is shorter by $\varepsilon = F/S$, with
+# $S = EA$ the stiffness of the section (in plane strain $EA/(1-\nu^2)$).  Per way of the tool the front therefore runs
+# through $1+\varepsilon$ of the reference configuration, and the strip gives back $\tfrac12 F\varepsilon$:
+#
+# $$ F\left(1+\tfrac{\varepsilon}{2}\right) = G_c\,w\,(1+\varepsilon), \qquad
+# \frac{A_\mathrm{swept}}{w\,\Delta s} = 1+\varepsilon. $$
+#
+# From this follow three numbers that can fail, in plane strain and in space, each on two meshes:
+#
+# 1. the mean force of the steady stretch against this closed form;
+# 2. force × way over the area swept by the front between two depths, which is to be $G_c$, and that area itself;
+# 3. the work of a first insertion less that of a second along the broken path (Azar and Hayward 2008), to the lower end
+#    of the stretch and to the upper one; the difference of the two over width × depth × $(1+\varepsilon)$.
+#
+# There is neither friction nor viscosity.
+
+import logging
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from mpi4py import MPI
+
+from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
+from cutsim.results.output import write_summary
+from cutsim.results.plots import Curve, plot_curves
+from cutsim.results.recording import Recording
+from cutsim.studies.insertion import Insertion
+from cutsim.studies.insertion_work import SteadyCut, TwoInsertions, steady_force
+
+MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
+
+# ## The strip
+#
+# Half thickness and width [mm], a soft silicone, and a bond whose process zone several elements resolve.
+
+HALF, WIDTH, HEIGHT, NOTCH = 1.0, 1.0, 6.5, 0.5
+SILICONE = NeoHookean(0.777, 0.45)  # MPa
+BOND = Exponential.from_parameters(strength=0.3, toughness=0.1)  # MPa, N/mm
+STEADY = (2.0, 4.0)  # depths of the tip between which the cut is steady [mm]
+STEP = 0.05  # way of the tool in a step, at most [mm]
+
+
+@dataclass(frozen=True)
+class Strip:
+    """Dimension, element size along the crack [mm], and in space layers of elements across the half width."""
+
+    dim: int
+    size: float
+    layers: int = 2
+
+    @property
+    def name(self) -> str:
+        """What the results are called."""
+        return f"{self.dim}-D, h = {self.size:g} mm"
+
+    @property
+    def folder(self) -> str:
+        """Where they go."""
+        return f"{self.dim}d_{self.size:g}"
+
+    @property
+    def width(self) -> float:
+        """Length of the cutting edge, 1 in plane strain [mm]."""
+        return WIDTH if self.dim == 3 else 1.0
+
+    @property
+    def stiffness(self) -> float:
+        """Axial stiffness of the section below the cut [N], per width in plane strain."""
+        E, nu = SILICONE.young, SILICONE.poisson
+        return 2 * HALF * self.width * (E if self.dim == 3 else E / (1 - nu**2))
+
+    def build(self, turn: float) -> Insertion:
+        """Strip and blade; a half of the strip in space, where its middle plane is one of symmetry. Collective."""
+        sizes = {"dim": self.dim, "Lx": HALF, "H": HEIGHT, "lc": self.size, "band": 0.3, "growth": 1.6, "notch": NOTCH}
+        if self.dim == 3:
+            sizes |= {"B": WIDTH, "sym": 1, "nz": self.layers}
+        forward, lateral = (0.0, -1.0, 0.0)[: self.dim], (1.0, 0.0, 0.0)[: self.dim]
+        blade = Blade(np.radians(20), max(0.1, self.size), 0.5, forward, lateral)
+        domain = read_geo(MESH, MPI.COMM_WORLD, sizes, gdim=self.dim)
+        return Insertion.build(domain, SILICONE, BOND, blade, notch=NOTCH, turn=turn)
+
+
+# ## Settings
+
+FULL = (Strip(2, 0.1), Strip(2, 0.05), Strip(3, 0.2), Strip(3, 0.1))
+QUICK = (Strip(2, 0.2), Strip(2, 0.1), Strip(3, 0.2, layers=1))
+
+Summary = dict[str, float | list[float]]
+History = dict[str, np.ndarray]
+
+
+def main(
+    quick: Annotated[bool, typer.Option("--quick", help="coarser meshes")] = False,
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/steady_cut"),
+) -> None:
+    """Split strips, twice each, in plane strain and in space: what force and front say of the toughness."""
+    logging.basicConfig(level=logging.ERROR, format="%(name)s: %(message)s")
+    begun = time.perf_counter()
+    histories, summary = {}, {"toughness_given": BOND.toughness[0]}
+    for strip in QUICK if quick else FULL:
+        twice = [push(strip, depth, out / f"{strip.folder}_to_{depth:g}") for depth in STEADY]
+        histories[strip] = twice[-1][1]
+        summary |= {f"{strip.name}, {name}": value for name, value in found(strip, *twice).items()}
+    summary |= {"ranks": float(MPI.COMM_WORLD.size), "seconds": time.perf_counter() - begun}
+    write_summary(out / "summary.json", summary, MPI.COMM_WORLD)
+    if MPI.COMM_WORLD.rank == 0:
+        draw(histories, out / "force.png")
+        for name, value in summary.items():
+            typer.echo(f"{name:>50}  {value:.5g}")
+    check(summary, list(histories))
+
+
+def push(strip: Strip, depth: float, out: Path) -> tuple[Insertion, History]:
+    """Two insertions to a depth. Collective."""
+    cut = strip.build(turn=depth)
+    down, until = cut.time_of(depth), cut.time_of(depth, 2)
+    show = {"depth": "depth", "force": "force"}
+    with Recording(out, cut.mechanics, until, title=strip.name, show=show, extra=cut.columns, every=0) as recording:
+        run(cut.mechanics, down, StepControl(first=0.02, largest=STEP), recording)
+        run(cut.mechanics, until, StepControl(first=STEP, largest=4 * STEP), recording)
+    history = recording.columns()
+    if history["time"][-1] < until:
+        raise typer.Exit(1)  # interrupted: what was recorded stays
+    return cut, history
+
+
+# ## What came out
+#
+# The closed forms know toughness and section; force, front and work know nothing of the cohesive law's energies.
+
+
+def found(strip: Strip, shallow: tuple[Insertion, History], deep: tuple[Insertion, History]) -> Summary:
+    """What force and front say of a strip, from insertions to the two ends of the steady stretch."""
+    history = deep[1]
+    stretch = SteadyCut.of(history, *STEADY)
+    force = steady_force(BOND.toughness[0], strip.width, strip.stiffness)
+    area = strip.width * stretch.way * (1 + force / strip.stiffness)
+    both = [TwoInsertions.of(history, cut) for cut, history in (shallow, deep)]
+    added = both[1].beyond(both[0])
+    return {
+        "steady force per width": stretch.force / strip.width,
+        "steady force over closed form": stretch.force / force,
+        "drift of the steady force": stretch.drift,
+        "swept area over closed form": stretch.swept / area,
+        "force times way over swept area": stretch.toughness(strip.stiffness),
+        "two insertions": (added.first - added.second) / area,
+        "largest closure": float(np.abs(history["energy_closure"]).max()),
+    }
+
+
+def draw(histories: dict[Strip, History], path: Path) -> None:
+    """Force per width of the first insertion into each strip, with the closed forms. Call it on one rank."""
+    curves, theory = [], {}
+    for strip, history in histories.items():
+        first = slice(0, int(np.argmax(history["depth"])) + 1)
+        curves.append(Curve(history["depth"][first], history["force"][first] / strip.width, strip.name))
+        theory[strip.dim] = steady_force(BOND.toughness[0], strip.width, strip.stiffness) / strip.width
+    curves += [
+        Curve(STEADY, [force] * 2, f"closed form, {dim}-D", "k" + "-:"[dim - 2]) for dim, force in theory.items()
+    ]
+    plot_curves(
+        path,
+        curves,
+        xlabel="depth of the tip [mm]",
+        ylabel="force per width [N/mm]",
+        title="A strip is split",
+        references={"$G_c$": BOND.toughness[0]},
+    )
+
+
+def check(summary: Summary, strips: list[Strip]) -> None:
+    """The headline numbers, asserted; a mesh of 0.2 mm does not resolve the process zone."""
+    for strip in strips:
+        allowed = 0.01 if strip.size <= 0.1 else 0.04
+        for name in ("steady force over closed form", "swept area over closed form"):
+            assert abs(summary[f"{strip.name}, {name}"] - 1) < allowed, (strip.name, name)
+        for name in ("force times way over swept area", "two insertions"):
+            assert abs(summary[f"{strip.name}, {name}"] / BOND.toughness[0] - 1) < 2 * allowed, (strip.name, name)
+
+
+if __name__ == "__main__":
+    typer.run(main)
