@@ -182,20 +182,27 @@ class Indentation:
         return patch.surface.points, patch.pressure()
 
     def columns(self, columns: Columns) -> Columns:
-        """Approach, and force and contact radius of the whole bodies. Collective.
-
-        The radius is that of the half ellipsoid whose pressure has the second moment found, ∫ p r² dA = ⅖ a² ∫ p dA: it
-        does not go by elements as the area that is pressed does.
-        """
+        """Approach, and force and contact radius of the whole bodies. Collective."""
         quarter = -columns["ball_force"][0] if self.elastic else columns["ball_force_z"][0]
-        points, pressure = self.pressure()
-        place = points.evaluator({"x": ufl.SpatialCoordinate(self.mechanics.state.mesh)})()["x"]
-        moment = points.integral(pressure * (place[..., :2] ** 2).sum(axis=-1)) / points.integral(pressure)
         return {
             "depth": (self.specimen.depth * self.mechanics.state.time, "length"),
             "force": (4 * quarter, "force"),
-            "radius": (float(np.sqrt(2.5 * moment)), "length"),
+            "radius": (self.radius(), "length"),
         }
+
+    def radius(self) -> float:
+        """Radius of the half ellipsoid of pressure that has the moments found [mm]. Collective.
+
+        These do not go by elements as the area that is pressed does.  The moment ∫ p r² = ⅖ a² ∫ p is the sharpest;
+        where meshes do not match it suffers from points that are pressed beyond the rim, and (∫ p)² = 8/9 π a² ∫ p² does
+        not.
+        """
+        points, pressure = self.pressure()
+        load = 4 * points.integral(pressure)
+        if self.elastic:
+            return float(np.sqrt(9 / 8 / np.pi * load**2 / (4 * points.integral(pressure**2))))
+        place = points.evaluator({"x": ufl.SpatialCoordinate(self.mechanics.state.mesh)})()["x"]
+        return float(np.sqrt(2.5 * 4 * points.integral(pressure * (place[..., :2] ** 2).sum(axis=-1)) / load))
 
     def result(self, history: dict[str, np.ndarray]) -> dict[str, float]:
         """Largest distances from Hertz's theory over all depths, and where they are in the end."""
@@ -460,11 +467,11 @@ def check(results: dict[str, dict[str, float]], *, quick: bool) -> None:
     for name in ("rigid", "thesis", "elastic"):
         result = results[name]
         assert result["force_off"] < (0.03 if quick else 0.02), name
-        assert result["radius_off_in_elements"] < 1.0, name
+        assert abs(result["radius_over_hertz_last"] - 1) < 0.03, name
         assert result["energy_closure"] < 2 * trapezoidal, name
     for name in ("mindlin", "cylinder"):
         result = results[name]
-        assert abs(result["half_width"] - result["half_width_of_theory"]) < result["element"], name
+        assert abs(result["half_width"] / result["half_width_of_theory"] - 1) < 0.01, name
         assert abs(result["peak_pressure"] / result["peak_pressure_of_theory"] - 1) < 0.03, name
         assert result["energy_closure"] < 1e-3, name
     assert abs(results["mindlin"]["stick"] / results["mindlin"]["stick_of_theory"] - 1) < 0.05

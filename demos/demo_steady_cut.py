@@ -25,7 +25,8 @@
 # 3. the work of a first insertion less that of a second along the broken path (Azar and Hayward 2008), to the lower end
 #    of the stretch and to the upper one; the difference of the two over width × depth × $(1+\varepsilon)$.
 #
-# There is neither friction nor viscosity.
+# There is no friction, and a trace of viscosity only: it carries coarse meshes across the jumps of the front from node to
+# node, and adds 0.1 to 0.3 % to the force.
 
 import logging
 import time
@@ -38,7 +39,7 @@ import typer
 from mpi4py import MPI
 
 from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
-from cutsim.results.output import write_summary
+from cutsim.results.output import claim_folder, write_summary
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Recording
 from cutsim.studies.insertion import Insertion
@@ -51,7 +52,7 @@ MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
 # Half thickness and width [mm], a soft silicone, and a bond whose process zone several elements resolve.
 
 HALF, WIDTH, HEIGHT, NOTCH = 1.0, 1.0, 6.5, 0.5
-SILICONE = NeoHookean(0.777, 0.45)  # MPa
+SILICONE, VISCOSITY = NeoHookean(0.777, 0.45), 2e-4  # MPa, MPa s at 1 mm/s
 BOND = Exponential.from_parameters(strength=0.3, toughness=0.1)  # MPa, N/mm
 STEADY = (2.0, 4.0)  # depths of the tip between which the cut is steady [mm]
 STEP = 0.05  # way of the tool in a step, at most [mm]
@@ -94,7 +95,7 @@ class Strip:
         forward, lateral = (0.0, -1.0, 0.0)[: self.dim], (1.0, 0.0, 0.0)[: self.dim]
         blade = Blade(np.radians(20), max(0.1, self.size), 0.5, forward, lateral)
         domain = read_geo(MESH, MPI.COMM_WORLD, sizes, gdim=self.dim)
-        return Insertion.build(domain, SILICONE, BOND, blade, notch=NOTCH, turn=turn)
+        return Insertion.build(domain, SILICONE, BOND, blade, notch=NOTCH, viscosity=VISCOSITY, turn=turn)
 
 
 # ## Settings
@@ -109,9 +110,11 @@ History = dict[str, np.ndarray]
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="coarser meshes")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/steady_cut"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Split strips, twice each, in plane strain and in space: what force and front say of the toughness."""
     logging.basicConfig(level=logging.ERROR, format="%(name)s: %(message)s")
+    claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
     begun = time.perf_counter()
     histories, summary = {}, {"toughness_given": BOND.toughness[0]}
     for strip in QUICK if quick else FULL:
@@ -135,10 +138,8 @@ def push(strip: Strip, depth: float, out: Path) -> tuple[Insertion, History]:
     with Recording(out, cut.mechanics, until, title=strip.name, show=show, extra=cut.columns, every=0) as recording:
         run(cut.mechanics, down, StepControl(first=0.02, largest=STEP), recording)
         run(cut.mechanics, until, StepControl(first=STEP, largest=4 * STEP), recording)
-    history = recording.columns()
-    if history["time"][-1] < until:
-        raise typer.Exit(1)  # interrupted: what was recorded stays
-    return cut, history
+    recording.summary()
+    return cut, recording.columns()
 
 
 # ## What came out
