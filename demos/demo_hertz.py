@@ -194,8 +194,8 @@ class Indentation:
         """Radius of the half ellipsoid of pressure that has the moments found [mm]. Collective.
 
         These do not go by elements as the area that is pressed does.  The moment ∫ p r² = ⅖ a² ∫ p is the sharpest;
-        where meshes do not match it suffers from points that are pressed beyond the rim, and (∫ p)² = 8/9 π a² ∫ p² does
-        not.
+        where meshes do not match it suffers from points that are pressed beyond the rim, and (∫ p)² = 8/9 π a² ∫ p²
+        does not.
         """
         points, pressure = self.pressure()
         load = 4 * points.integral(pressure)

@@ -25,8 +25,8 @@
 # 3. the work of a first insertion less that of a second along the broken path (Azar and Hayward 2008), to the lower end
 #    of the stretch and to the upper one; the difference of the two over width × depth × $(1+\varepsilon)$.
 #
-# There is no friction, and a trace of viscosity only: it carries coarse meshes across the jumps of the front from node to
-# node, and adds 0.1 to 0.3 % to the force.
+# There is no friction, and a trace of viscosity only: it carries coarse meshes across the jumps of the front from node
+# to node, and adds 0.1 to 0.3 % to the force.
 
 import logging
 import time
