@@ -5,12 +5,12 @@ from math import e, sqrt
 
 import numpy as np
 import pytest
-from conftest import BILINEAR, EXPONENTIAL, PPR
+from conftest import BILINEAR, EXPONENTIAL, PPR, PROPORTIONAL
 
 from cutsim.interface.cohesive import Bilinear, Exponential, process_zone_element
 from cutsim.interface.dissipation import Way, losses
 
-LAWS = [EXPONENTIAL, BILINEAR, PPR]
+LAWS = [EXPONENTIAL, BILINEAR, PROPORTIONAL, PPR]
 
 PAIRS = [
     {"strength": 2.0, "opening": 0.1},
@@ -66,6 +66,54 @@ def test_bilinear_refuses(name):
         Bilinear(**{**good, name: 0})
     with pytest.raises(ValueError, match=r"penalty = 9.0 is not allowed.* = 10"):
         Bilinear(**{**good, "penalty": 9.0})
+
+
+def test_another_stiffness_in_sliding():
+    """Each mode by itself rises with its own stiffness to its own strength, and both in proportion if so chosen."""
+    law = replace(BILINEAR, shear_penalty=77.0)
+    for mode, (stiffness, strength, toughness) in enumerate(((200.0, 2.0, 0.2), (77.0, 3.0, 0.5))):
+        peak, end = strength / stiffness, 2 * toughness / strength
+        jumps = np.array([0.5 * peak, peak, 0.5 * (peak + end), end, 2 * end])
+        opening, sliding = (jumps, 0 * jumps) if mode == 0 else (0 * jumps, jumps)
+        traction = law.secants(opening, sliding)[mode] * jumps
+        np.testing.assert_allclose(traction, strength * np.array([0.5, 1, 0.5, 0, 0]), atol=1e-9)
+    assert PROPORTIONAL.shear_penalty == pytest.approx(200.0 * (0.2 / 0.5) * (3.0 / 2.0) ** 2)
+    scale = np.sqrt(200.0 / PROPORTIONAL.shear_penalty)
+    for mix in (
+        0.0,
+        0.3,
+        0.8,
+        1.0,
+    ):  # of the work, along straight ways: damage begins at the same part of the toughness
+        toughness = 0.2 + 0.3 * mix**1.7
+        way = np.linspace(0, 1, 100_001) * 2 * 0.6
+        D = damage(PROPORTIONAL, way * sqrt(1 - mix), way * sqrt(mix) * scale)[0]
+        onset = way[np.argmax(D > 1e-9)]
+        assert 0.5 * 200.0 * onset**2 == pytest.approx(toughness * 2.0**2 / (2 * 200.0 * 0.2), rel=1e-2)
+    with pytest.raises(ValueError, match=r"shear_penalty = 9.0 .* t_t²/\(2 G_II\) = 9"):
+        replace(BILINEAR, shear_penalty=9.0)
+
+
+@pytest.mark.parametrize("strength", [1.0, 3.0, 6.0])
+@pytest.mark.parametrize("mix", [0.0, 0.2, 0.5, 0.9, 1.0])
+@pytest.mark.parametrize("make", [Bilinear, Bilinear.proportional], ids=["one stiffness", "in proportion"])
+def test_toughness_at_a_mode_ratio_is_that_of_benzeggagh_and_kenane_whatever_the_strengths(make, mix, strength):
+    law = make(400.0, 2.0, 0.2, strength, 0.5, 1.7)
+    stiffer = (law.shear_penalty or law.penalty) / law.penalty
+    end = np.array([sqrt(1 - mix), sqrt(mix / stiffer)])
+    assert spent(law, np.array([[0.0, 0.0], 50 * end]))[0] == pytest.approx(0.2 + 0.3 * mix**1.7, rel=1e-7)
+
+
+def test_work_of_a_way_that_changes_its_mode_and_the_strengths():
+    """Opened to half the toughness, then slid: in proportion the work is the same for any shear strength."""
+    way = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 2.0]])
+    works = {
+        make: [spent(make(4000.0, 2.0, 0.2, t_t, 0.5, 1.7), way).sum() for t_t in (1.0, 2.0, 6.0)]
+        for make in (Bilinear, Bilinear.proportional)
+    }
+    assert np.ptp(works[Bilinear.proportional]) < 1e-7 * works[Bilinear.proportional][0]
+    assert 0.2 < works[Bilinear.proportional][0] < 0.5
+    assert max(works[Bilinear]) > 0.5 > 0.2 > min(works[Bilinear]), "with one stiffness not even between both modes"
 
 
 def damage(law, opening, sliding):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, EXPONENTIAL, NU, PPR, E, history, make_blocks, remember, rotation
+from conftest import BILINEAR, EXPONENTIAL, NU, PPR, PROPORTIONAL, E, history, make_blocks, remember, rotation
 from dolfinx import fem, la
 
 from cutsim.analysis.mechanics import Mechanics
@@ -27,13 +27,17 @@ def exponential(law, sliding, opening):
 
 
 def bilinear(law, sliding, opening):
-    """Camanho, Davila and Turon, written anew: tractions on the envelope."""
-    jump = np.hypot(sliding, opening)
-    B = (sliding / jump) ** 2
-    onset = np.sqrt(law.t_n**2 + (law.t_t**2 - law.t_n**2) * B**law.eta) / law.penalty
-    final = 2 * (law.G_I + (law.G_II - law.G_I) * B**law.eta) / (law.penalty * onset)
+    """Turon and others, written anew with two stiffnesses: tractions on the envelope."""
+    K_n, K_t = law.penalty, law.shear_penalty or law.penalty
+    B = K_t * sliding**2 / (K_n * opening**2 + K_t * sliding**2)
+    jump = (K_n * opening**2 + K_t * sliding**2) / np.sqrt(K_n**2 * opening**2 + K_t**2 * sliding**2)
+    stiffness = K_n * (1 - B) + K_t * B
+    onset_n, onset_t, final_n, final_t = law.t_n / K_n, law.t_t / K_t, 2 * law.G_I / law.t_n, 2 * law.G_II / law.t_t
+    by = B**law.eta
+    onset = np.sqrt((K_n * onset_n**2 + (K_t * onset_t**2 - K_n * onset_n**2) * by) / stiffness)
+    final = (K_n * onset_n * final_n + (K_t * onset_t * final_t - K_n * onset_n * final_n) * by) / (stiffness * onset)
     d = np.clip(final * (jump - onset) / (jump * (final - onset)), 0, 1) if jump > onset else 0.0
-    return (1 - d) * law.penalty * sliding, (1 - d) * law.penalty * opening
+    return (1 - d) * K_t * sliding, (1 - d) * K_n * opening
 
 
 def ppr(law, sliding, opening):
@@ -74,6 +78,7 @@ LOOPS = {
 LAWS = {
     "exponential": (EXPONENTIAL, exponential, (EXPONENTIAL.eps_t, EXPONENTIAL.eps_n)),
     "bilinear": (BILINEAR, bilinear, (0.05, 0.02)),
+    "proportional": (PROPORTIONAL, bilinear, (0.05, 0.02)),
     "ppr": (PPR, ppr, (PPR.peak_t * PPR.final[1], PPR.peak_n * PPR.final[0])),
 }
 

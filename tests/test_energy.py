@@ -3,15 +3,19 @@
 import numpy as np
 import pytest
 from conftest import EXPONENTIAL, NU, E, history, make_blocks
+from dolfinx import fem, mesh
+from mpi4py import MPI
 
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.terms import ENTRIES
 from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
 from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
-from cutsim.materials.elastic import NeoHookean
+from cutsim.materials.elastic import LinearElastic, NeoHookean
 
 DISSIPATED = ("fracture", "friction", "viscous")
 WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
@@ -57,6 +61,23 @@ def test_each_entry_matters(loop, name):
     gap = np.abs(loop["work_external"] - sum(e for n, e in entries.items() if n != name))
     turnover = np.maximum.accumulate(np.maximum(np.abs(loop["work_external"]), sum(map(np.abs, entries.values()))))
     assert (gap / turnover)[turnover > 0].max() > 3e-3
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("viscosity", [0.01, 0.5])
+def test_a_support_that_moves_at_once_closes_from_the_first_step(viscosity):
+    """A bar to and fro at speed v: the viscous force jumps with the speed, and takes the power η v² from the start."""
+    speed = 1e-3
+    square = mesh.create_unit_square(MPI.COMM_WORLD, 2, 2)
+    state = State(fem.functionspace(square, ("Lagrange", 1, (2,))))
+    ends = [mesh.locate_entities_boundary(square, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0.0, 1.0)]
+    supports = [Support(state, end, 0) for end in ends] + [Support(state, ends[0], 1)]
+    supports.append(Support(state, ends[1], 1, lambda t: speed * min(t, 1 - t), corners=(0.5,)))
+    solid = Solid(state, LinearElastic(E, 0.0), viscosity=viscosity)
+    rows = history(Mechanics(state, [solid], supports), 1.0, StepControl(0.01, 0.1, closure=5e-3))
+    assert np.abs(rows["energy_closure"]).max() < 1e-4
+    np.testing.assert_allclose(rows["energy_viscous"], viscosity * speed**2 * rows["time"], rtol=3e-3)
+    assert rows["work_external"][-1] == pytest.approx(viscosity * speed**2, rel=3e-3)
 
 
 def test_viscous_dissipation_in_closed_form():

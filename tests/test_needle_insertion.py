@@ -153,6 +153,9 @@ def test_two_insertions_differ_by_the_new_surface(twice, toughness, friction):
     assert both.toughness == pytest.approx(toughness, rel=0.03)
     assert np.abs(history["energy_closure"]).max() < 0.015
     assert np.diff(history["energy_friction"]).min() >= 0
+    assert np.diff(history["cut"]).min() >= -1e-12 * history["cut"].max(), "a cut that closes again is not healed"
+    turned = np.interp(cut.time_of(cut.turn), history["time"], history["cut"])
+    assert history["cut"][-1] == pytest.approx(turned, rel=0.02) and turned > 0.5 * (cut.turn - cut.tip)
     broken = np.interp(cut.time_of(cut.turn), history["time"], history["energy_fracture"])
     assert history["energy_fracture"][-1] == pytest.approx(broken, rel=0.02), "the second time hardly anything breaks"
 

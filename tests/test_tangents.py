@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, EXPONENTIAL, NU, PPR, E, make_blocks, remember, slopes
+from conftest import BILINEAR, EXPONENTIAL, NU, PPR, PROPORTIONAL, E, make_blocks, remember, slopes
 from dolfinx import fem, la
 from dolfinx.fem.petsc import assemble_matrix
 
@@ -144,6 +144,7 @@ JUMPS = {
 LAWS = {
     "exponential": (EXPONENTIAL, 0.1),
     "bilinear": (BILINEAR, 0.02),
+    "proportional": (PROPORTIONAL, 0.02),
     "ppr": (PPR, 0.05),
     "contact only": (None, 0.1),
 }
@@ -161,9 +162,13 @@ def separated(b, sliding, opening, wobble):
 BARE = [("contact only", "current", "compression")]
 
 
+# another stiffness in sliding changes nothing but the envelope
+MIXED = [("proportional", "current", "mixed")]
+
+
 @pytest.mark.parametrize(
     ("law", "normal", "jump"),
-    [*itertools.product(("exponential", "bilinear", "ppr"), ("current", "reference"), JUMPS), *BARE],
+    [*itertools.product(("exponential", "bilinear", "ppr"), ("current", "reference"), JUMPS), *BARE, *MIXED],
 )
 def test_crack(law, normal, jump):
     sliding, opening, past = JUMPS[jump]

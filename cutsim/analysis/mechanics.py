@@ -110,9 +110,10 @@ class Mechanics:
         self._apart = unjoined(state.mesh, [t.facets for t in terms if isinstance(t, SurfacePair)])
         if self._apart:
             state.verdict.doubt("mesh", f"mesh: {self._apart}")
-        self._begun = False
+        self._begun = self._moved = False
         self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
         self._residual_old: NDArray[np.float64] = self._residual
+        self._rate_forces = self._rate_forces_old = np.zeros_like(self._residual)
 
     @property
     def fields(self) -> Mapping[str, Expr]:
@@ -219,10 +220,18 @@ class Mechanics:
         self._residual = self._out_of_balance()
         if self.inertia is not None:
             self._residual = self.inertia.balance(self._residual, self._residual_old, ~fixed)
+        rates = [forces for t in self._static if (forces := t.rate_forces()) is not None]
+        self._rate_forces = np.sum([np.zeros_like(self._residual), *rates], axis=0)
         mean = 0.5 * (self._residual + self._residual_old)
+        if self._jerks():  # what follows the velocity has its value at the end of the step from its beginning on
+            mean += 0.5 * (self._rate_forces - self._rate_forces_old)
         work = global_dot(self.state.mesh.comm, mean[fixed], self.state.increment[fixed])
         work += sum(t.external_work() for t in self.terms)
         self._trial_audit = self.audit.advance(work, [t.energies() for t in self.terms])
+
+    def _jerks(self) -> bool:
+        """Whether prescribed velocities may jump at the start of the step: at rest before it, or at a corner."""
+        return not self._moved or self.state.time_old in self.corners
 
     @property
     def trial_audit(self) -> EnergyAudit:
@@ -291,6 +300,7 @@ class Mechanics:
         for support in self.supports:
             support.begin(self.state.time)
         self._trial_audit, self._residual = self.audit, self._residual_old
+        self._rate_forces = self._rate_forces_old
 
     def commit(self) -> None:
         """Adopt the trial step."""
@@ -298,6 +308,7 @@ class Mechanics:
             term.commit()
         self.state.commit()
         self.audit, self._residual_old = self._trial_audit, self._residual
+        self._rate_forces_old, self._moved = self._rate_forces, True
 
     def _interface_nodes(self, interfaces: Sequence[Crack | SurfacePair]) -> NDArray[np.int32]:
         """Owned nodes on both faces of all cracks and pairs of surfaces."""

@@ -114,6 +114,10 @@ class Term:
         """Trial value of the audit entries this term contributes to [energy]. Collective."""
         return {}
 
+    def rate_forces(self) -> NDArray[np.float64] | None:
+        """The part of the forces in the trial step that jumps with the velocity, owned entries. Collective."""
+        return None
+
     def external_work(self) -> float:
         """External work that enters through this term in the trial step [energy]. Collective."""
         return 0.0

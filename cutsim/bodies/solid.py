@@ -11,7 +11,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from cutsim.base.assembly import integrate
+from cutsim.base.assembly import integrate, nodal_forces
 from cutsim.base.checks import nonnegative, positive, require, require_number
 from cutsim.base.compat import evaluate, expression, form
 from cutsim.base.kinematics import Expr, cofactor, deformation_gradient, green_lagrange
@@ -103,6 +103,7 @@ class Solid(Term):
         self._histories = [part for part in (self._pressure, self._overstress) if part is not None]
         self._energy_form = form(self._stored(state.u))
         self._viscous_form = form(self._viscous_work()) if viscosity else None
+        self._rate_form = form(self._viscous_forces(ufl.TestFunction(state.V))) if viscosity else None
         self._viscous = self._viscous_old = 0.0
         self._thermal = self._thermal_old = 0.0
         if thermoelastic is not None and temperature is not None:
@@ -165,9 +166,7 @@ class Solid(Term):
             J = ufl.det(self.deformation_gradient(u))
             work += self._mixed.pressure * ufl.derivative(J, u, v) * self.measures[0]
         if self.viscosity:
-            E, change = self._strain()
-            rate = change / self.state.dt
-            work += self._viscosity * ufl.inner(rate, ufl.derivative(E, u, v)) * self.measures[0]
+            work += self._viscous_forces(v)
         if self._overstress is not None:
             work += self._overstress.residual(v)
         return work
@@ -220,6 +219,10 @@ class Solid(Term):
         if self.temperature is not None:
             self._thermal = self._thermal_old - integrate(self._heating_form)
             self._temperature_trial = self.temperature.value.x.array.copy()
+
+    def rate_forces(self) -> NDArray[np.float64] | None:
+        """Viscous forces. Collective."""
+        return None if self._rate_form is None else nodal_forces(self._rate_form)
 
     def energies(self) -> dict[str, float]:
         """Strain energy, work of viscous stresses and minus the strain energy brought by heat so far. Collective."""
@@ -342,6 +345,11 @@ class Solid(Term):
         seen = self._temperature_seen
         total = self._stored(new, T) - self._stored(new, seen) + self._stored(old, T) - self._stored(old, seen)
         return 0.5 * total
+
+    def _viscous_forces(self, v: Expr) -> ufl.Form:
+        E, change = self._strain()
+        rate = change / self.state.dt
+        return self._viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
 
     def _viscous_work(self) -> ufl.Form:
         _, change = self._strain()

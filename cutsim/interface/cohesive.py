@@ -194,19 +194,25 @@ class ByToughness:
 class Bilinear(ByToughness):
     """Bilinear mixed-mode law with the Benzeggagh–Kenane criterion (Camanho, Turon et al. 2006).
 
-    T = (1 − d) K δ with d the largest value so far of λ_f (λ − λ_0) / (λ (λ_f − λ_0)), λ the norm of the jump,
-    B = δ_t²/λ², λ_0² = δ_n0² + (δ_t0² − δ_n0²) B^η and λ_f = 2 (G_I + (G_II − G_I) B^η) / (K λ_0).
+    T_n = (1 − d) K δ_n and T_t = (1 − d) K_t δ_t with d the largest value so far of λ_f (λ − λ_0) / (λ (λ_f − λ_0)).
+    There λ² = δ_n² + (K_t/K) δ_t², B = (K_t/K) δ_t²/λ² is the share of sliding in the work,
+    K² λ_0² = t_n² + (t_t² K/K_t − t_n²) B^η and λ_f = 2 (G_I + (G_II − G_I) B^η) / (K λ_0).
+
+    With K_t = K (Camanho et al.) the onset of damage and the toughness depend on B in different ways as soon as
+    (t_t/t_n)² is not G_II/G_I: where the mode changes while a point breaks, as at the tip of a bending specimen, the
+    work spent then depends on the strengths.  With the stiffnesses of `proportional` it depends on the toughnesses.
 
     Args:
-        penalty: Stiffness K of the intact bond [stress/length].
+        penalty: Stiffness K of the intact bond, in opening [stress/length].
         t_n: Normal strength [stress].
         G_I: Toughness in opening [force/length].
         t_t: Shear strength [stress].
         G_II: Toughness in sliding [force/length].
         eta: Exponent η of the Benzeggagh–Kenane criterion [–].
+        shear_penalty: Stiffness K_t of the intact bond in sliding [stress/length]; None for that in opening.
 
     Raises:
-        ValueError: A value is not positive, or K is so small that the bond would be broken before its peak.
+        ValueError: A value is not positive, or a stiffness so small that the bond would be broken before its peak.
     """
 
     penalty: float
@@ -215,12 +221,37 @@ class Bilinear(ByToughness):
     t_t: float
     G_II: float
     eta: float = 2.0
+    shear_penalty: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("penalty", "t_n", "G_I", "t_t", "G_II", "eta"):
             require_number(name, getattr(self, name), positive)
-        least = max(self.t_n**2 / (2 * self.G_I), self.t_t**2 / (2 * self.G_II))
+        opening, sliding = self.t_n**2 / (2 * self.G_I), self.t_t**2 / (2 * self.G_II)
+        least = opening if self.shear_penalty is not None else max(opening, sliding)
         require_number("penalty", self.penalty, above(least, "strength²/(2 toughness)"))
+        require_number("shear_penalty", self.shear_penalty, above(sliding, "t_t²/(2 G_II)").or_none)
+
+    @classmethod
+    @checked
+    def proportional(
+        cls, penalty: float, t_n: float, G_I: float, t_t: float, G_II: float, eta: float = 2.0
+    ) -> "Bilinear":
+        """Make the law whose modes rise and soften in proportion, K_t = K (G_I/G_II) (t_t/t_n)² (Turon et al. 2010).
+
+        Then λ_0 and λ_f are in the same proportion at any mode ratio, and the onset follows the Benzeggagh–Kenane
+        criterion like the toughness.  (Turon, Camanho, Costa and Renart, Composite Structures 92, 1857–1864.)
+
+        Args:
+            penalty: Stiffness K of the intact bond, in opening [stress/length].
+            t_n: Normal strength [stress].
+            G_I: Toughness in opening [force/length].
+            t_t: Shear strength [stress].
+            G_II: Toughness in sliding [force/length].
+            eta: Exponent η of the Benzeggagh–Kenane criterion [–].
+        """
+        for name, value in {"penalty": penalty, "t_n": t_n, "G_I": G_I, "t_t": t_t, "G_II": G_II}.items():
+            require_number(name, value, positive)
+        return cls(penalty, t_n, G_I, t_t, G_II, eta, penalty * G_I / G_II * (t_t / t_n) ** 2)
 
     @classmethod
     @checked
@@ -241,21 +272,28 @@ class Bilinear(ByToughness):
         return cls(max(t_n**2 / (2 * G_I), t_t**2 / (2 * G_II)) / rise, t_n, G_I, t_t, G_II, eta)
 
     def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
-        """Secant stiffness (1 − d) K of the envelope in both directions."""
+        """Secant stiffnesses (1 − d) K and (1 − d) K_t of the envelope."""
         # the floor keeps the direction of an unloaded jump defined; it is far below any opening that matters
         floor = (1e-8 * self.t_n / self.penalty) ** 2
-        square = opening**2 + sliding**2 + floor
+        # with sliding measured so that both modes are as stiff; work is the same
+        stiffer = 1.0 if self.shear_penalty is None else self.shear_penalty / self.penalty
+        slid = stiffer * sliding**2 + floor
+        square = opening**2 + slid
         jump = sqrt(square)
-        mix = ((sliding**2 + floor) / square) ** self.eta
-        onset = sqrt((self.t_n**2 + (self.t_t**2 - self.t_n**2) * mix) / self.penalty**2)
+        mix = (slid / square) ** self.eta
+        onset = sqrt((self.t_n**2 + (self.t_t**2 / stiffer - self.t_n**2) * mix) / self.penalty**2)
         final = 2 * (self.G_I + (self.G_II - self.G_I) * mix) / (self.penalty * onset)
         intact = onset * (final - jump) / (jump * (final - onset))
-        k = self.penalty * if_less(jump, onset, 1.0, if_less(jump, final, intact, 0.0))
-        return k, k
+        left = if_less(jump, onset, 1.0, if_less(jump, final, intact, 0.0))
+        return self.penalty * left, self._shear_penalty * left
 
     def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
         """Loss of secant stiffness, d."""
-        return 1 - k_n / self.penalty, 1 - k_t / self.penalty
+        return 1 - k_n / self.penalty, 1 - k_t / self._shear_penalty
+
+    @property
+    def _shear_penalty(self) -> float:
+        return self.penalty if self.shear_penalty is None else self.shear_penalty
 
 
 def process_zone_element(law: CohesiveLaw, young: float) -> float:

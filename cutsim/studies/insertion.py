@@ -237,18 +237,27 @@ class Insertion:
         heat = HeatTransfer(temperature, [body, InterfaceHeat(temperature, self.crack, faces), *tools])
         return ThermoMechanics(self.mechanics, heat)
 
+    def _largest_opening(self) -> NDArray[np.float64]:
+        """Largest opening so far at the points of the crack, from the memory of the bond [length]."""
+        openings = self.separation[0]
+        assert self.crack.law is not None
+        secants = self.crack.law.secants(openings, np.zeros_like(openings))[0]
+        # an intact bond may keep its stiffness, a broken one has none: the smallest opening with it counts
+        falling, first = np.unique(-secants, return_index=True)
+        return np.interp(-self.crack.points.get(self.crack.history.secants)[..., 0], falling, openings[first])
+
     def columns(self, columns: Columns) -> Columns:
         """Depth of the tip, force of the whole tool, its imbalance with the plate, areas; tip and shaft. Collective.
 
-        Forces are positive against the push.  The area behind the front is that where the crack is open by more than
-        spends half the work of separation; the cut area counts each point by the share of that work that belongs to its
-        opening.
+        Forces are positive against the push.  The area behind the front is that where the crack has been open by more
+        than spends half the work of separation; the cut area counts each point by the share of that work that belongs
+        to its largest opening so far, and never falls.
         """
         force = self.whole * sum(half.force()[1] for half in self.halves)
         reaction = self.whole * self.mechanics.reaction(self.plate)
         depth = -float(self.halves[0].position.value[1])
         imbalance = abs(reaction - force) / abs(force) if force else 0.0
-        points, opening = self.crack.points, self.crack.point_values("opening")
+        points, opening = self.crack.points, self._largest_opening()
         openings, spent = self.separation
         cut = points.integral(np.interp(opening, openings, spent))
         front = points.area_above(opening, float(np.interp(0.5, spent, openings)))
