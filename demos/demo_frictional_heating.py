@@ -62,10 +62,11 @@
 # conducts 15 mW/(mm² K), as ground steel does; its slab side three times as well as its block side.  Asperities give by
 # 1 µm before they slip.  *steel*: the same on the long slab.
 #
-# In *thesis* and *column* the pressure is uniform: the slab is fixed, and the block in a holder that leaves it free to
-# be compressed only.  In *steel* both are elastic, the top of the block is moved and the bottom of the slab held;
-# pressed in as far as in *column*, it bears half the load, and its front and rear edges press most.  All strokes are
-# shorter than an element, for which a contact of fixed pairs of facets is made.
+# In *thesis* and *column* the pressure is uniform: the slab is fixed at every node, and the block in a holder that
+# leaves it free to be compressed only.  This is what the closed forms need; the slab's modulus then does nothing, and
+# that of the block only says how far it is pressed in.  In *steel* both are elastic, the top of the block is moved and
+# the bottom of the slab held; pressed in as far as in *column*, it bears half the load, and its front and rear edges
+# press most.  All strokes are shorter than an element, for which a contact of fixed pairs of facets is made.
 
 import logging
 from collections.abc import Callable
@@ -197,7 +198,7 @@ class Pair:
 
 
 def supports(pair: Pair, state: State, domain: TaggedMesh, depth: float) -> list[Support]:
-    """Press the block in and slide it; for uniform pressure in a holder that moves all of it, on a fixed slab."""
+    """Press the block in and slide it; for uniform pressure in a holder, on a slab that is fixed everywhere."""
     moved = (domain.cells("upper"), 3) if pair.uniform else (domain.facets("top"), 2)
     fixed = (domain.cells("lower"), 3) if pair.uniform else (domain.facets("bottom"), 2)
     return [

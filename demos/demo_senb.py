@@ -22,6 +22,11 @@
 #   \left(\frac{P_c}{P}\right)^2 = 1 + c\,\frac{\ell}{W} + \dots \quad\text{(Bažant's size effect)},$$
 # so that the parabola through $(P_c/P)^2$ of three strengths, drawn to $\ell = 0$, ends near 1: within 2 % of the load.
 #
+# At the peak itself nothing is sharp, but three numbers have to agree, of which only the second knows the cohesive law:
+# $J$ over a domain that has the process zone within it; what the bond at the tip of the notch has cost by its opening,
+# $\int_0^{\delta_\mathrm{tip}} T\,\mathrm d\delta$ (Rice); and $G$ of the sharp crack that is as compliant, by load and
+# deflection and the formulas above.  When the bond at the notch has gone, $J$ is $G_c$ and stays so.
+#
 # **The parameters.**  The thesis prints a strength of 2–2.5 MPa, an opening of 0.001 mm and $G_c$ = 28.3–50 N/mm.  The
 # first two imply $G_c = e\,t\,\varepsilon$ = 0.0068 N/mm, a four-thousandth of the third.  The demo takes 0.0068 N/mm,
 # which goes with the printed opening.  Even so $\ell$ = 71 mm is longer than the beam is high: the strength of 2.5 MPa
@@ -48,13 +53,13 @@ from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh, read_geo
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
-from cutsim.interface.cohesive import Exponential
+from cutsim.interface.cohesive import Exponential, separation_curve
 from cutsim.interface.crack import Crack
 from cutsim.materials.elastic import LinearElastic
 from cutsim.results.output import claim_folder
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid
 from cutsim.results.plots import Curve, plot_curves, plot_energy
-from cutsim.results.recording import Recording
+from cutsim.results.recording import Columns, Recording
 from cutsim.studies.fracture import BentBeam, JIntegral, energy_release_from_energy, plane_modulus, stress_intensity
 
 MESH = Path(__file__).parent.parent / "meshes" / "senb.geo"
@@ -204,13 +209,21 @@ class Bending:
         """Bend in equal steps, to the end or past the peak only."""
         control = StepControl(first=1 / steps, largest=1 / steps, line_searches=("basic", "l2", "bt"))
         b = thickness(self.domain)
+        # from 5 to 8 mm around the notch's tip: the process zone is within, until the crack has run on
+        vectors = [vector[: self.mechanics.state.mesh.geometry.dim] for vector in ((0.0, A, 0.0), (0.0, 1.0, 0.0))]
+        front = (0.0, 0.0, 1.0) if len(vectors[0]) == 3 else None
+        J = JIntegral(self.solid, *vectors, 5.0, 8.0, front=front, length=b)
+
+        def columns(columns: Columns) -> Columns:
+            return {"load_per_thickness": (-columns["load_force"][0] / b, "toughness"), "J": (J(), "toughness")}
+
         with Recording(
             folder,
             self.mechanics,
             1.0,
             title=folder.name,
             show={"force": "load_force", "broken": "crack_broken"},
-            extra=lambda columns: {"load_per_thickness": (-columns["load_force"][0] / b, "toughness")},
+            extra=columns,
             derived={"cauchy_stress": self.solid.cauchy_stress(self.solid.state.u)},
             every=0 if to_peak else 5,
         ) as recording:
@@ -226,14 +239,33 @@ def peak_load(law: Exponential, parameters: dict[str, float], deflection: float,
     return float(recording.column("load_per_thickness").max())
 
 
-def limit_curve(compliance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Deflection and load per thickness of a growing sharp crack, from dC/da = 2 (K/P)²/E' and K = √(E' G_c)."""
-    beam = BentBeam(W, 1.0)
+def sharp_cracks(compliance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lengths of sharp cracks and their compliances, from that of the notch and dC/da = 2 (K/P)²/E'."""
     a = np.linspace(A, 0.85 * W, 400)
-    slope = np.array([2 * beam.stress_intensity(1.0, x) ** 2 / MODULUS for x in a])
-    C = compliance + np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(a))])
-    P = np.array([beam.critical_load(TOUGHNESS, x, MODULUS) for x in a])
+    slope = np.array([2 * BentBeam(W, 1.0).stress_intensity(1.0, x) ** 2 / MODULUS for x in a])
+    return a, compliance + np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(a))])
+
+
+def limit_curve(compliance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Deflection and load per thickness of a growing sharp crack, K = √(E' G_c)."""
+    a, C = sharp_cracks(compliance)
+    P = np.array([BentBeam(W, 1.0).critical_load(TOUGHNESS, x, MODULUS) for x in a])
     return C * P, P
+
+
+def at_peak(recording: Recording, law: Exponential, compliance: float) -> dict[str, float]:
+    """Energy release rate at the peak load, three ways, and J once the bond at the notch has gone."""
+    load, J = (recording.column(name) for name in ("load_per_thickness", "J"))
+    i = int(load.argmax())
+    deflection, opening = (abs(float(recording.column(name)[i])) for name in ("load_displacement", "crack_opening"))
+    a, C = sharp_cracks(compliance)
+    K = BentBeam(W, 1.0).stress_intensity(load[i], float(np.interp(deflection / load[i], C, a)))
+    return {
+        "J_at_peak": float(J[i]),
+        "work_of_the_tip_at_peak": TOUGHNESS * float(np.interp(opening, *separation_curve(law))),
+        "G_at_peak_of_crack_as_compliant": K**2 / MODULUS,
+        "largest_J_over_toughness": float(J.max()) / TOUGHNESS,
+    }
 
 
 # ## Settings
@@ -312,7 +344,13 @@ def propagation(dim: int, quick: bool, out: Path, notch: dict[str, Any]) -> tupl
         "dissipation_over_toughness": recording.column("energy_fracture")[-1]
         / (recording.column("crack_broken")[-1] * TOUGHNESS),
         "energy_closure": np.abs(recording.column("energy_closure")).max(),
+        **at_peak(recording, beam.crack.law, notch["compliance_per_thickness"]),
     }
+    report(
+        "at the peak J {J_at_peak:.5f}, by the bond at the tip {work_of_the_tip_at_peak:.5f}, of a sharp crack as "
+        "compliant {G_at_peak_of_crack_as_compliant:.5f} N/mm; then J is {largest_J_over_toughness:.4f} G_c",
+        summary,
+    )
     report(
         "peak {peak_load:.2f} N: of a sharp crack's {peak_over_closed_form:.4f} by closed form, "
         "{peak_over_critical_load_by_J:.4f} by J; dissipation per broken area {dissipation_over_toughness:.4f} G_c; "
@@ -321,7 +359,10 @@ def propagation(dim: int, quick: bool, out: Path, notch: dict[str, Any]) -> tupl
     )
     assert abs(summary["dissipation_over_toughness"] - 1) < 0.01, "the dissipation is not G_c times the broken area"
     assert summary["energy_closure"] < 0.01, "the energy audit does not close"
-    assert 0.6 < summary["peak_over_critical_load_by_J"] < 1.0, "the peak load is out of range"
+    if dim == 2:  # in 3-D the process zone reaches beyond the domain of J
+        assert abs(summary["J_at_peak"] / summary["work_of_the_tip_at_peak"] - 1) < 0.02, "the peak: J and the bond"
+        assert abs(summary["J_at_peak"] / summary["G_at_peak_of_crack_as_compliant"] - 1) < 0.05, "the peak: J and G"
+        assert abs(summary["largest_J_over_toughness"] - 1) < 0.01, "a running crack takes another J than G_c"
     return recording, summary
 
 

@@ -40,7 +40,8 @@
 # 0.1 MPa.  An interface of that capacity stays with the block and keeps 90 % of the heat, and the slab conducts so well
 # that no spot is seen.
 #
-# *insulator*: steel under 100 MPa at 10 mm/s, the block taking no heat, which theory has in closed form.  *steel*:
+# *insulator*: steel under 100 MPa at 10 mm/s, the block taking no heat, which theory has in closed form.  In both the
+# slab is fixed at every node, which makes the pressure uniform: its modulus does nothing.  *steel*:
 # block and slab of steel, both elastic, the top of the block moved and the bottom of the slab held.  Front and rear
 # edges of the block press most, and theory for a uniform flux is an estimate.
 
