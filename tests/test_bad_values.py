@@ -15,6 +15,7 @@ from dolfinx import jit
 from mpi4py import MPI
 
 import cutsim
+import cutsim.identify
 
 INF = float("inf")
 FIBRE = (1.0, 0.0, 0.0)
@@ -160,12 +161,24 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "tag_mesh": lambda: {"mesh": world()["mesh"], "cells": {}, "facets": {}},
 }  # fmt: skip
 
+LINE = np.linspace(1.0, 2.0, 10)
+EXAMPLES |= {
+    "identify.StressTest": good(path="uniaxial", stretch=LINE, stress=LINE, weight=1.0),
+    "identify.fit_material": lambda: {
+        "guess": ELASTIC, "vary": ["young"], "tests": [cutsim.identify.StressTest("uniaxial", LINE, LINE)],
+    },
+    "identify.fit_simulation": good(simulate=lambda v: (LINE, LINE), guess={"a": 1.0}, x=LINE, y=LINE),
+    "identify.read_table": good(path="table.csv", columns={"force": ("F", "N")}),
+}  # fmt: skip
+
 #: Made by others, not from numbers of a user.
 MADE = {"CohesiveLaw", "FrictionLaw", "Insertion", "LayeredBlock", "Material", "StepError", "StepReport"}
 #: Where infinity says that there is no limit.
 ENDLESS = {("run", "until")}
+#: What takes files and curves, beside what is in `cutsim` itself.
+FILES_AND_CURVES = ("StressTest", "fit_material", "fit_simulation", "read_table")
 #: Functions that are called during the run only.
-LATER = {("Path", "position"), ("run", "record"), ("run", "stop")}
+LATER = {("Path", "position"), ("run", "record"), ("run", "stop"), ("identify.fit_simulation", "simulate")}
 #: Handed to dolfinx as they are.
 FREE = {("cracked_space", "element")}
 
@@ -180,7 +193,7 @@ def callables():
         if inspect.isclass(item):
             methods = (n for c in item.__mro__ for n, m in vars(c).items() if isinstance(m, classmethod))
             found |= {f"{name}.{n}": getattr(item, n) for n in methods if not n.startswith("_")}
-    return found
+    return found | {f"identify.{n}": getattr(cutsim.identify, n) for n in FILES_AND_CURVES}
 
 
 def hints(item):
@@ -244,7 +257,7 @@ def test_bad_values_are_refused_by_name(name, parameter, monkeypatch):
             item(**arguments | {parameter: value})
             wrong.append(f"{label}: accepted")
         except (ValueError, TypeError) as error:
-            if not re.match(rf"{parameter}\b", str(error)):
+            if not re.match(rf"(shape of |indices of )?{parameter}\b", str(error)):
                 wrong.append(f"{label}: {type(error).__name__}: {error}")
         except Exception as error:
             wrong.append(f"{label}: {type(error).__name__}: {error}")

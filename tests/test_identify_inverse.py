@@ -137,7 +137,7 @@ def test_bounds_are_kept(caplog):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "magic"}, r"method = 'magic' .* gradient, simplex"),
+        ({"method": "magic"}, r"method = 'magic' .* 'gradient' or 'simplex'"),
         ({"step": 0.0}, r"step = 0.0"),
         ({"tolerance": 2.0}, r"tolerance = 2.0"),
         ({"workers": 0}, r"workers = 0"),

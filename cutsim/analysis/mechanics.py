@@ -81,7 +81,6 @@ class Mechanics:
         names = [t.name for t in terms] + [s.name for s in supports if s.name]
         require("terms", len(terms), len(terms) > 0, "at least one term")
         require("names", names, len(set(names)) == len(names), "different for all terms and supports")
-        require("analysis", analysis, analysis in ("quasi-static", "dynamic"), "'quasi-static' or 'dynamic'")
         self.state, self._static, self.supports = state, tuple(terms), tuple(supports)
         solids = [t for t in terms if isinstance(t, Solid)]
         self.inertia = Inertia(state, solids, scheme, mass) if analysis == "dynamic" else None

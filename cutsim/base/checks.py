@@ -154,8 +154,19 @@ def require_numbers(
     require(name, values, fits and all(value in allowed for value in values), f"{many}, each {allowed}")
 
 
+def as_numbers(name: str, values: Any) -> NDArray[np.float64]:
+    """Numbers, which need not be finite, as an array; for arguments and Raises see `as_array`."""
+    try:
+        array = np.asarray(values)
+        numbers = array.dtype.kind in "iuf"
+    except ValueError:
+        numbers = False
+    require(name, values, numbers, "an array of numbers")
+    return array.astype(np.float64)
+
+
 def as_array(name: str, values: Any) -> NDArray[np.float64]:
-    """Numbers as an array.
+    """Finite numbers as an array.
 
     Args:
         name: Name of the parameter as the user wrote it.
@@ -164,10 +175,6 @@ def as_array(name: str, values: Any) -> NDArray[np.float64]:
     Raises:
         ValueError: They are no numbers, not finite, or rows have different lengths.
     """
-    try:
-        array = np.asarray(values)
-        numbers = array.dtype.kind in "iuf" and bool(np.isfinite(array).all())
-    except ValueError:
-        numbers = False
-    require(name, values, numbers, "an array of finite numbers")
-    return array.astype(np.float64)
+    array = as_numbers(name, values)
+    require(name, values, bool(np.isfinite(array).all()), "an array of finite numbers")
+    return array

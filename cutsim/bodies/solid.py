@@ -76,11 +76,8 @@ class Solid(Term):
         temperature: Temperature | None = None,
     ) -> None:
         gdim = state.mesh.geometry.dim
-        require("plane", plane, plane in ("strain", "stress"), "'strain' or 'stress'")
         require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
         require("plane", plane, plane == "strain" or not state.axisymmetric, "'strain' in an axisymmetric problem")
-        kinds = ("auto", "full", "reduced", "mixed", "taylor-hood")
-        require("volumetric", volumetric, volumetric in kinds, f"one of {', '.join(kinds)}")
         require_number("viscosity", viscosity, nonnegative)
         require_number("density", density, positive.or_none)
         # there λ₃ would depend on the overstress

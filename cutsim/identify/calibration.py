@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.parameters import numbers, with_numbers
+from cutsim.base.signatures import checked
 from cutsim.identify.fitting import Bounds, Fit, Values, fit_model, require_pairs
 from cutsim.identify.response import Response, nominal_stress, unstable_stretches
 from cutsim.materials.elastic import Material
@@ -29,6 +30,7 @@ _ZEROS: dict[str, Callable[[StressTest], float]] = {
 _LEAST = 1e-3
 
 
+@checked
 @dataclass(frozen=True)
 class StressTest:
     """Nominal stress measured against stretch.
@@ -87,6 +89,7 @@ class MaterialFit:
         plot_curves(path, curves, xlabel="stretch [1]", ylabel=f"nominal stress [{unit}]", title=title)
 
 
+@checked
 def fit_material(
     guess: Material,
     vary: Sequence[str],

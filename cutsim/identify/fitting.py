@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, stats
 
-from cutsim.base.checks import between, require, require_number
+from cutsim.base.checks import as_numbers, between, finite, require, require_number
 
 logger = logging.getLogger(__name__)
 #: Chance of the runs of the residuals below which they are taken for systematic.
@@ -162,6 +162,7 @@ def require_problem(guess: Values, count: int, bounds: Bounds | None) -> None:
     require("number of measured values", count, count > len(guess) > 0, f"more than the {len(guess)} parameters, >= 1")
     for name, value in guess.items():
         low, high = (bounds or {}).get(name, (-np.inf, np.inf))
+        require_number(f"guess of {name}", value, finite)
         require(f"guess of {name}", value, bool(value) and low <= value <= high, f"not zero, in [{low}, {high}]")
     for name in bounds or {}:
         require("bounds", name, name in guess, "of one of " + ", ".join(guess))
@@ -179,8 +180,10 @@ def require_pairs(first: str, x: ArrayLike, second: str, y: ArrayLike) -> None:
     Raises:
         ValueError: They are not one-dimensional, not of one length, or not finite.
     """
+    for name, values in ((first, x), (second, y)):
+        as_numbers(name, values)
     shape = np.shape(x)
-    require(f"shape of {first}", shape, len(shape) == 1, "one-dimensional")
+    require(f"shape of {first}", shape, len(shape) == 1 and shape[0] > 0, "one-dimensional, of at least one number")
     require(f"shape of {second}", np.shape(y), np.shape(y) == shape, f"{shape}, one number for each {first}")
     for name, values in ((first, x), (second, y)):
         bad = np.flatnonzero(~np.isfinite(values))

@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import optimize
 
 from cutsim.analysis.stepping import StepError
-from cutsim.base.checks import between, require, require_number
+from cutsim.base.checks import between, count, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.identify.fitting import Bounds, Fit, Values, finished, limits_of, require_pairs, require_problem
 from cutsim.results.progress import Progress
 
@@ -86,6 +87,7 @@ class Evaluations:
             file.write(json.dumps(row) + "\n")
 
 
+@checked
 def fit_simulation(
     simulate: Simulation,
     guess: Values,
@@ -132,13 +134,14 @@ def fit_simulation(
         ValueError: An option or guess is outside its range, there are too few data, a simulation does not reach over
             the measured abscissae or turns back more or less often, or the curve does not depend on a parameter.
     """
-    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     require_pairs("x", x, "y", y)
-    require("method", method, method in _SEARCHES, "one of " + ", ".join(_SEARCHES))
+    x, y = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     require_number("step", step, between(0, 1))
     require_number("tolerance", tolerance, between(0, 1))
     ranks = MPI.COMM_WORLD.size
-    require("workers", workers, workers >= 1 and (workers == 1 or ranks == 1), ">= 1, and 1 on several ranks")
+    require_number("evaluations", evaluations, count(1))
+    require_number("workers", workers, count(1))
+    require("workers", workers, workers == 1 or ranks == 1, "1 on several ranks")
     require_problem(guess, len(y), bounds)
     # children must not inherit the state of MPI: no fork
     pool = ProcessPoolExecutor(workers, get_context("spawn")) if workers > 1 else nullcontext()

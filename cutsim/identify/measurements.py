@@ -14,7 +14,8 @@ import numpy as np
 import pint
 from numpy.typing import ArrayLike, NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import as_numbers, count, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.base.units import Units
 
 #: What a unit is made of, and how it is composed of length, force, time and temperature.
@@ -56,6 +57,7 @@ class _Column:
         require(f"{self.path}, line {self.lines[i]}, column {self.title!r}", self.cells[i], bool(valid), allowed)
 
 
+@checked
 def read_table(
     path: Path | str,
     columns: Mapping[str, tuple[str, str]],
@@ -93,6 +95,7 @@ def read_table(
             file is no text; the message names the file, the line, the column and the cell as written.
         OSError: The file cannot be read.
     """
+    require_number("skip", skip, count())
     require("increasing", increasing, increasing is None or increasing in columns, f"one of {', '.join(columns)}")
     for quantity, (title, unit) in columns.items():
         _check_unit(f"{path}, unit of column {title!r}", quantity, unit)
@@ -111,6 +114,7 @@ def read_table(
     return table
 
 
+@checked
 def converted(values: ArrayLike, unit: str, units: Units, name: str = "unit") -> NDArray[np.float64]:
     """Numbers of any unit in the consistent units of a run.
 
@@ -123,7 +127,7 @@ def converted(values: ArrayLike, unit: str, units: Units, name: str = "unit") ->
     Raises:
         ValueError: The unit is unknown, or not made of length, force, time and temperature.
     """
-    quantity = _quantity(np.asarray(values, dtype=np.float64), unit)
+    quantity = _quantity(as_numbers("values", values), unit)
     require(name, unit, quantity is not None, _ALLOWED)
     assert quantity is not None
     exponents = sum((np.array(_POWERS[d]) * p for d, p in quantity.dimensionality.items()), np.zeros(4))

@@ -97,7 +97,6 @@ class Crack(Term):
         normal: Literal["current", "reference"] = "current",
     ) -> None:
         require_number("young", young, positive)
-        require("normal", normal, normal in ("current", "reference"), "'current' or 'reference'")
         require_number("penetration", penetration, positive.or_none)
         self.name, self.state, self.law = name, state, law
         self._current = normal == "current"

@@ -5,7 +5,7 @@ from typing import Literal
 import ufl
 from dolfinx import fem
 
-from cutsim.base.checks import positive, require, require_number
+from cutsim.base.checks import positive, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.log import collective_logger
@@ -17,8 +17,6 @@ from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
 
 logger = collective_logger(__name__)
-
-_AREAS = ("broken", "contact", "thesis")
 
 
 class CrackFriction(Term):
@@ -54,7 +52,6 @@ class CrackFriction(Term):
         stick: float | None = None,
         temperature: fem.Function | None = None,
     ) -> None:
-        require("acts_on", acts_on, acts_on in _AREAS, f"one of {', '.join(_AREAS)}")
         require_number("stick", stick, positive.or_none)
         if acts_on == "thesis":
             words = f"{crack.name}: open faces rub (friction 'thesis'); use it for comparison only"
