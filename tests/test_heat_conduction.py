@@ -173,6 +173,28 @@ def test_convection():
     assert np.abs(rows["heat_closure"]).max() < 1e-9
 
 
+@pytest.mark.mpi
+def test_prescribed_temperatures_agree_where_they_meet():
+    """What two hold counts once, and the books close; unequal temperatures of one node are refused."""
+    bar = Bar(cells=(4, 2))
+    ends = bar.hold(310.0, 300.0)
+
+    def heat(value):
+        below = PrescribedTemperature(bar.T, bar.face(1, 0.0), value, name="below")
+        return HeatTransfer(bar.T, [HeatBody(bar.T, **BODY)], [ends[0], below])
+
+    with pytest.raises(
+        ValueError, match=r"temperatures 'left' and 'below' prescribe T = 310 and 300 .* 1 nodes .* \(0, 0\)"
+    ):
+        heat(300.0)
+    with pytest.raises(ValueError, match=r"T = 310 and 315 at time 0.5"):
+        run(heat(lambda t: 310 + 10 * t), 1.0, StepControl.fixed(0.5))
+    rows = history(heat(310.0), 1.0, StepControl.fixed(0.5))
+    assert np.abs(rows["heat_closure"]).max() < 1e-9
+    stored = RHO * C * (rows["body_temperature"][-1] - 300)
+    assert 0.5 * (rows["left_heat_flow"] + rows["below_heat_flow"]).sum() == pytest.approx(stored, rel=1e-9)
+
+
 def test_prescribed_flux_and_temperature():
     """Steady: the slope is q/k; a temperature ramped at a rate stores ρ c rate far from the start."""
     bar, q = Bar(), 5.0

@@ -19,11 +19,11 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.base.verdict import CLOSURE
-from cutsim.bodies.constraints import Constraints
 from cutsim.bodies.inertia import Inertia
 from cutsim.bodies.loads import Load, Support
 from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
 from cutsim.bodies.solid import Solid
+from cutsim.fields.constraints import Constraints
 from cutsim.fields.state import State
 from cutsim.fields.twins import unjoined
 from cutsim.interface.crack import Crack
@@ -32,6 +32,8 @@ from cutsim.solvers.newton import NonlinearProblem, Outcome
 
 # displacement over the size of the mesh at which a solve is given up
 _RUNAWAY = 100.0
+# difference of two prescribed displacements over that size that is none
+_ROUNDING = 1e-12
 #: What a viscosity may take of the energy that is lost.
 VISCOUS = 0.01
 #: Uzawa augmentations allowed in one step.
@@ -85,7 +87,9 @@ class Mechanics:
         solids = [t for t in terms if isinstance(t, Solid)]
         self.inertia = Inertia(state, solids, scheme, mass) if analysis == "dynamic" else None
         self.terms: tuple[Term, ...] = self._static if self.inertia is None else (*terms, self.inertia)
-        self._constraints = Constraints(state, supports)
+        size = extent(state.mesh.comm, state.mesh.geometry.x)
+        self._constraints = Constraints(state.V, supports, "supports", _ROUNDING * size)
+        self._constraints.check(state.time)
         self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
         _check_one_law(state, [t for t in terms if isinstance(t, Crack)])
         v = ufl.TestFunction(state.V)
@@ -103,7 +107,7 @@ class Mechanics:
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
             rtol=rtol,
-            largest=_RUNAWAY * extent(state.mesh.comm, state.mesh.geometry.x),
+            largest=_RUNAWAY * size,
         )
         self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
         self._apart = unjoined(state.mesh, [t.facets for t in terms if isinstance(t, SurfacePair)])
@@ -154,7 +158,7 @@ class Mechanics:
         self.state.begin(time)
         for part in self._parts:
             part.begin(time)
-        self._constraints.check()
+        self._constraints.check(time)
         if self.inertia is not None:
             self.problem.known[:] = self.inertia.history(self._residual_old)
 
@@ -287,7 +291,7 @@ class Mechanics:
             columns |= term.record()
         for support in self.supports:
             if support.name:
-                columns[f"{support.name}_displacement"] = (support.displacement, "length")
+                columns[f"{support.name}_displacement"] = (support.prescribed, "length")
                 columns[f"{support.name}_force"] = (self.reaction(support), "force")
         return columns | self._trial_audit.record()
 

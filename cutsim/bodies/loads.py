@@ -35,6 +35,7 @@ class Support:
 
     Attributes:
         dofs: Owned dofs that it holds.
+        symbol: The component in words, such as "u_x".
 
     Raises:
         ValueError: The component does not exist, or no entity is found on any rank.
@@ -59,6 +60,7 @@ class Support:
         require("dim", dim, dim is None or dim in range(tdim + 1), f"0 … {tdim}, or None for facets")
         dim = tdim - 1 if dim is None else dim
         self.name, self.state, self.component, self.corners = name, state, component, corners
+        self.symbol = f"u_{'xyz'[component]}"
         self._value = Schedule(state.mesh, value, "value")
         dofs = gdim * locate_dofs(state.V, dim, entities) + component
         owned = len(state.increment)
@@ -68,7 +70,7 @@ class Support:
         self.bc = fem.dirichletbc(self._value.constant, dofs, state.V.sub(component))
 
     @property
-    def displacement(self) -> float:
+    def prescribed(self) -> float:
         """Prescribed displacement at the end of the step [length]."""
         return self._value.value
 

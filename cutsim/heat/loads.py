@@ -148,7 +148,8 @@ class Convection(_SurfaceHeat):
 class PrescribedTemperature:
     """Given temperature on some facets (or vertices, or cells), with the heat flow it takes.
 
-    On a crack it holds all its sides.
+    On a crack it holds all its sides. Several may hold the same node if they agree on its temperature at all times; its
+    heat flow then counts for the first of them that has a name.
 
     Args:
         temperature: The temperature.
@@ -157,6 +158,10 @@ class PrescribedTemperature:
         name: Name in the history, None to leave the heat flow out of it.
         dim: Dimension of the entities; facets by default.
         corners: Times at which the temperature jumps or has a kink.
+
+    Attributes:
+        dofs: Owned dofs that it holds.
+        symbol: "T".
 
     Raises:
         ValueError: No entity is found on any rank, or the temperature is below absolute zero.
@@ -181,8 +186,8 @@ class PrescribedTemperature:
         tdim = mesh.topology.dim
         require("dim", dim, dim is None or dim in range(tdim + 1), f"0 … {tdim}, or None for facets")
         dofs = locate_dofs(V, tdim - 1 if dim is None else dim, entities)
-        self._dofs = dofs[dofs < V.dofmap.index_map.size_local]
-        found = mesh.comm.allreduce(len(self._dofs))
+        self.dofs, self.symbol = dofs[dofs < V.dofmap.index_map.size_local], "T"
+        found = mesh.comm.allreduce(len(self.dofs))
         require("entities", found, found > 0, f"entities that carry dofs (prescribed temperature {name!r})")
         self.bc = fem.dirichletbc(self._value.constant, dofs, V)
 
@@ -195,13 +200,10 @@ class PrescribedTemperature:
         self._value.begin(time)
         self.temperature.check("value", self._value.value)
 
-    def heat_flow(self, residual: NDArray[np.float64]) -> float:
-        """Heat flow into the body [power]. Collective.
-
-        Args:
-            residual: Owned entries of heat stored minus supplied, per time, at the nodes.
-        """
-        return float(self.temperature.space.mesh.comm.allreduce(float(residual[self._dofs].sum())))
+    @property
+    def prescribed(self) -> float:
+        """Prescribed temperature at the end of the step [temperature]."""
+        return self._value.value
 
     def rollback(self) -> None:
         """Set the temperature back to the start of the step."""

@@ -13,6 +13,7 @@ from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.verdict import CLOSURE
+from cutsim.fields.constraints import Constraints
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatBalance, HeatTerm
 from cutsim.heat.conduction import HeatBody
@@ -40,7 +41,8 @@ class HeatTransfer:
         rtol: Residual tolerance relative to the heat flows.
 
     Raises:
-        ValueError: A node has no body, or two terms or prescribed temperatures share a name.
+        ValueError: A node has no body, two terms or prescribed temperatures share a name, or two prescribe different
+            temperatures of one node.
     """
 
     @checked
@@ -61,6 +63,8 @@ class HeatTransfer:
         require("names", names, len(set(names)) == len(names), "different for all terms and prescribed temperatures")
         self.temperature, self.state = temperature, temperature.state
         self.terms, self.prescribed = tuple(terms), tuple(prescribed)
+        self._constraints = Constraints(temperature.space, prescribed, "prescribed temperatures")
+        self._constraints.check(self.state.time)
         self._parts: tuple[HeatTerm | PrescribedTemperature, ...] = (*terms, *prescribed)
         w = ufl.TestFunction(temperature.space)
         self.problem = NonlinearProblem(
@@ -108,6 +112,7 @@ class HeatTransfer:
         self.state.begin(time)
         for part in self._parts:
             part.begin(time)
+        self._constraints.check(time)
 
     def predict(self) -> None:
         """Nothing: the problem is linear, and found in one iteration from anywhere."""
@@ -128,7 +133,7 @@ class HeatTransfer:
         self._residual = residual.array_r.copy()
         residual.destroy()
         dt = float(self.state.dt.value)
-        flows = [{"outflow": -p.heat_flow(self._residual) * dt} for p in self.prescribed]
+        flows = [{"outflow": -self._constraints.reaction(p, self._residual) * dt} for p in self.prescribed]
         self._trial_audit = self.audit.advance([*(t.heat() for t in self.terms), *flows])
 
     def damage_increment(self) -> float:
@@ -152,7 +157,10 @@ class HeatTransfer:
             columns |= term.record()
         for prescribed in self.prescribed:
             if prescribed.name:
-                columns[f"{prescribed.name}_heat_flow"] = (prescribed.heat_flow(self._residual), "power")
+                columns[f"{prescribed.name}_heat_flow"] = (
+                    self._constraints.reaction(prescribed, self._residual),
+                    "power",
+                )
         columns["temperature_min"] = (self.temperature.minimum(), "temperature")
         columns["temperature_max"] = (self.temperature.maximum(), "temperature")
         return columns | self._trial_audit.record()
