@@ -221,14 +221,15 @@ class FieldWriter(_Closing):
         groups = {"displacement": [u], "fields": [d.shown for d in self._derived], **surfaces}
         comm = u.function_space.mesh.comm
         on_root(comm, lambda: Path(directory).mkdir(parents=True, exist_ok=True))
+        self._comm, self._directory = comm, Path(directory)
+        self._bytes = comm.allreduce(sum(_bytes(f) for functions in groups.values() for f in functions))
+        on_root(comm, self._check_space)
         self._stack = ExitStack()
         self._writers = [
             self._stack.enter_context(io.VTXWriter(comm, f"{directory}/{stem}.bp", functions, engine="BP4"))
             for stem, functions in groups.items()
             if functions
         ]
-        self._comm, self._directory = comm, Path(directory)
-        self._bytes = comm.allreduce(sum(_bytes(f) for functions in groups.values() for f in functions))
 
     def write(self, time: float) -> None:
         """Evaluate the derived fields and write everything as the state at one time. Collective.
