@@ -171,7 +171,10 @@ def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False,
     def claim() -> None:
         older = sorted(Path(folder).glob("**/history.csv" if subfolders else "history.csv"))
         if older and not overwrite:
-            raise FileExistsError(f"{older[0]} is of an older run: choose another folder, or overwrite it")
+            raise FileExistsError(
+                f"{older[0]} is of an older run: choose another folder, or have it overwritten (overwrite=True, "
+                "--overwrite)"
+            )
         for history in older:
             history.unlink()
             history.with_name("summary.json").unlink(missing_ok=True)
