@@ -20,17 +20,19 @@ class EnergyAudit:
         entries: The other side, `cutsim.base.terms.ENTRIES`; an entry to which no term contributes stays zero.
         scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with
             (`cutsim.analysis.mechanics` takes the energy that breaks one facet, the least a cracked mesh can resolve).
+        missed: The largest amount so far by which the two sides differ.
     """
 
     external: float = 0.0
     initial: float = 0.0
     entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys(ENTRIES, 0.0))
     scale: float = 0.0
+    missed: float = 0.0
 
     def start(self, energies: Iterable[Mapping[str, float]]) -> "EnergyAudit":
         """Audit of a state that starts with energy; arguments as `advance`."""
         audit = self.advance(0.0, energies)
-        return replace(audit, initial=sum(audit.entries.values()))
+        return replace(audit, initial=sum(audit.entries.values()), missed=self.missed)
 
     def advance(self, work: float, energies: Iterable[Mapping[str, float]]) -> "EnergyAudit":
         """Audit after a step.
@@ -45,12 +47,24 @@ class EnergyAudit:
                 entries[name] += value
         external = self.external + work
         turnover = max(abs(external), sum(abs(v) for v in entries.values()))
-        return replace(self, external=external, entries=entries, scale=max(self.scale, turnover))
+        gap = abs(self.initial + external - sum(entries.values()))
+        return replace(
+            self,
+            external=external,
+            entries=entries,
+            scale=max(self.scale, turnover),
+            missed=max(self.missed, gap),
+        )
 
     @property
     def closure(self) -> float:
         """(initial energy + external work − sum of the entries) / largest turnover so far [–]."""
         return (self.initial + self.external - sum(self.entries.values())) / self.scale if self.scale > 0 else 0.0
+
+    @property
+    def worst_closure(self) -> float:
+        """What was missing at the worst, relative to the largest turnover: a poor start counts little later on [–]."""
+        return self.missed / self.scale if self.scale > 0 else 0.0
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity)."""

@@ -34,6 +34,8 @@ from cutsim.solvers.newton import NonlinearProblem, Outcome
 _RUNAWAY = 100.0
 # difference of two prescribed displacements over that size that is none
 _ROUNDING = 1e-12
+# growth of the turnover in a step from which on nothing is said aloud: the books have just begun
+_BEGUN = 2.0
 #: What a viscosity may take of the energy that is lost.
 VISCOUS = 0.01
 #: Uzawa augmentations allowed in one step.
@@ -253,11 +255,11 @@ class Mechanics:
 
     def _watch_books(self) -> None:
         """Doubt books that do not close, and a viscosity that takes part in what is lost."""
-        verdict, closure, entries = self.state.verdict, abs(self._trial_audit.closure), self._trial_audit.entries
-        if closure > CLOSURE:
-            verdict.doubt(
-                "closure", f"{closure:.1%} of the energy is missing in the audit: smaller steps are needed", closure
-            )
+        verdict, audit, entries = self.state.verdict, self._trial_audit, self._trial_audit.entries
+        verdict.withdraw("closure")
+        if audit.worst_closure > CLOSURE:
+            words = f"{audit.worst_closure:.1%} of the energy is missing in the audit: smaller steps are needed"
+            verdict.suppose("closure", words, aloud=audit.scale < _BEGUN * self.audit.scale)
         lost = entries["fracture"] + entries["friction"]
         viscous = sum(t.viscous_work for t in self.terms if isinstance(t, Solid))
         verdict.withdraw("viscosity")

@@ -36,6 +36,10 @@ class Audit(Protocol):
     """Books of a conserved quantity."""
 
     @property
+    def scale(self) -> float:
+        """The largest turnover so far, to which the closure is relative."""
+
+    @property
     def closure(self) -> float:
         """What is missing, relative to the largest turnover so far [–]."""
 
@@ -123,7 +127,7 @@ class StepControl:
         cut: Factor after a rejected step, in (0, 1).
         easy: Newton iterations up to which a step counts as easy.
         damage: Largest growth of damage at a point in a step, in (0, 1]; None for no limit.
-        closure: Largest change of the energy audit's relative closure in a step; None for no limit.
+        closure: Largest part of the turnover that the energy audit may miss by a step; None for no limit.
         line_searches: Line searches tried in turn for the same step. For tools the default is best; for cracks in
             stiff, slender bodies ("basic", "l2", "bt").
 
@@ -293,7 +297,6 @@ def _advance(problem: Problem, control: StepControl, dt: float, corner: float, *
 
 def _attempt(problem: Problem, control: StepControl, end: float, *, predict: bool) -> tuple[Outcome, str | None]:
     """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
-    before = problem.audit.closure
     for retry, line_search in enumerate(control.line_searches):
         problem.rollback()
         problem.begin(end)
@@ -302,7 +305,7 @@ def _attempt(problem: Problem, control: StepControl, end: float, *, predict: boo
             problem.predict()
         outcome = problem.solve(line_search)
         failure = _failure(problem, outcome)
-        if predicted and failure is None and abs(problem.trial_audit.closure - before) > _STRAYED:
+        if predicted and failure is None and _drift(problem) > _STRAYED:
             failure = "the start from the last step's rate leads to another equilibrium"
         if failure is None:
             break
@@ -311,10 +314,16 @@ def _attempt(problem: Problem, control: StepControl, end: float, *, predict: boo
     growth = problem.damage_increment()
     if control.damage is not None and growth > control.damage:
         return outcome, f"damage grows by {growth:.3g}, more than {control.damage:g}"
-    drift = abs(problem.trial_audit.closure - before)
+    drift = _drift(problem)
     if control.closure is not None and drift > control.closure:
         return outcome, f"energy closure changes by {drift:.2g}, more than {control.closure:g}"
     return outcome, None
+
+
+def _drift(problem: Problem) -> float:
+    """What the books miss by the trial step, over the largest turnover; nothing while there was none to compare with."""
+    before, after = problem.audit, problem.trial_audit
+    return abs(after.closure * after.scale - before.closure * before.scale) / after.scale if before.scale > 0 else 0.0
 
 
 def _failure(problem: Problem, outcome: Outcome) -> str | None:

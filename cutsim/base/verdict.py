@@ -18,6 +18,7 @@ class Verdict:
     def __init__(self) -> None:
         self._reasons: dict[str, tuple[float, str]] = {}
         self._pending: dict[str, str] = {}
+        self._warned: set[str] = set()
 
     def doubt(self, kind: str, words: str, measure: float = 0.0) -> None:
         """Say what makes the result questionable.
@@ -28,13 +29,23 @@ class Verdict:
             measure: How bad it is; of one kind the worst is kept.
         """
         known = self._reasons.get(kind)
-        if known is None:
+        if kind not in self._warned:
             logger.warning("%s", words)
+            self._warned.add(kind)
         if known is None or measure > known[0]:
             self._reasons[kind] = measure, words
 
-    def suppose(self, kind: str, words: str) -> None:
-        """Say what makes the result questionable unless it is withdrawn before the end; nothing is warned of."""
+    def suppose(self, kind: str, words: str, *, aloud: bool = False) -> None:
+        """Say what makes the result questionable unless it is withdrawn before the end.
+
+        Args:
+            kind: What it is about.
+            words: The reason, with numbers.
+            aloud: Whether it is warned of, the first time.
+        """
+        if aloud and kind not in self._warned:
+            logger.warning("%s", words)
+            self._warned.add(kind)
         self._pending[kind] = words
 
     def withdraw(self, kind: str) -> None:
