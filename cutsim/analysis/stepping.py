@@ -321,7 +321,7 @@ def _attempt(problem: Problem, control: StepControl, end: float, *, predict: boo
 
 
 def _drift(problem: Problem) -> float:
-    """What the books miss by the trial step, over the largest turnover; nothing while there was none to compare with."""
+    """What the books miss by the trial step, over the largest turnover; nothing while there was none."""
     before, after = problem.audit, problem.trial_audit
     return abs(after.closure * after.scale - before.closure * before.scale) / after.scale if before.scale > 0 else 0.0
 
