@@ -389,5 +389,5 @@ def test_plus_side_is_checked_on_all_ranks():
     with pytest.raises(ValueError, match=r"plus: \[0\. 1\.\] is tangent to 4 facets"):
         crack_measure_entities(domain, facets, [0.0, 1.0])
     for plus in ([0.0, 0.0], [1.0, 0.0, 0.0], [np.nan, 1.0]):
-        with pytest.raises(ValueError, match=r"plus: .* is no direction; allowed are 2 finite floats"):
+        with pytest.raises(ValueError, match=r"plus\b.* (is no direction|is not allowed)"):
             crack_measure_entities(domain, facets, plus)
