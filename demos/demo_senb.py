@@ -359,8 +359,9 @@ def propagation(dim: int, quick: bool, out: Path, notch: dict[str, Any]) -> tupl
     )
     assert abs(summary["dissipation_over_toughness"] - 1) < 0.01, "the dissipation is not G_c times the broken area"
     assert summary["energy_closure"] < 0.01, "the energy audit does not close"
-    if dim == 2:  # in 3-D the process zone reaches beyond the domain of J
-        assert abs(summary["J_at_peak"] / summary["work_of_the_tip_at_peak"] - 1) < 0.02, "the peak: J and the bond"
+    off = summary["J_at_peak"] / summary["work_of_the_tip_at_peak"] - 1
+    assert abs(off) < (0.02 if dim == 2 else 0.03), "at the peak J is not what the bond at the tip has cost"
+    if dim == 2:  # in 3-D the process zone reaches beyond the domain of J, and the formulas are of plane strain
         assert abs(summary["J_at_peak"] / summary["G_at_peak_of_crack_as_compliant"] - 1) < 0.05, "the peak: J and G"
         assert abs(summary["largest_J_over_toughness"] - 1) < 0.01, "a running crack takes another J than G_c"
     return recording, summary

@@ -12,7 +12,7 @@ from ufl import SpatialCoordinate
 from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
 from cutsim.interface.cohesive import separation_curve
 from cutsim.studies.insertion import Insertion
-from cutsim.studies.insertion_work import SteadyCut, audited_toughness, steady_force
+from cutsim.studies.insertion_work import SteadyCut, TwoInsertions, audited_toughness, steady_force
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 TOUGHNESS = 0.1
@@ -27,22 +27,33 @@ def build(comm=MPI.COMM_WORLD, *, friction=0.0, viscosity=0.002, young=0.777, to
     return Insertion.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=viscosity)
 
 
-def push(cut, depth, control):
+def push(cut, depth, control, number=1):
     rows = []
-    run(cut.mechanics, cut.time_of(depth), control, lambda r: rows.append(r.columns | cut.columns(r.columns)))
+
+    def record(report):
+        rows.append({"time": (report.time, "time")} | report.columns | cut.columns(report.columns))
+
+    run(cut.mechanics, cut.time_of(depth, number), control, record)
     return {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
 
 
-def strip(size, dim=2, until=3.6, friction=0.0):
-    """Split a strip on a smooth plate, its sides free, with hardly any viscosity: problem and history."""
+def strip(size, dim=2, until=3.6, friction=0.0, turn=None):
+    """Split a strip on a smooth plate, its sides free, with hardly any viscosity: problem and history.
+
+    With a turn, draw the blade back from there and push it once more.
+    """
     sizes = {"dim": dim, "Lx": 1.0, "H": 6.0, "lc": size, "band": 0.3, "growth": 1.6, "notch": 0.5}
     sizes |= {"B": WIDTH, "sym": 1, "nz": 1} if dim == 3 else {}
     forward, lateral = (0.0, -1.0, 0.0)[:dim], (1.0, 0.0, 0.0)[:dim]
     blade = Blade(np.radians(20), max(0.1, size), 0.5, forward, lateral)
     law = Exponential.from_parameters(strength=0.3, toughness=TOUGHNESS)
     domain, silicone = read_geo(MESH, MPI.COMM_WORLD, sizes, gdim=dim), NeoHookean(0.777, 0.45)
-    cut = Insertion.build(domain, silicone, law, blade, notch=0.5, friction=friction, viscosity=2e-4)
-    return cut, push(cut, until, StepControl(first=0.02, largest=0.05))
+    cut = Insertion.build(domain, silicone, law, blade, notch=0.5, friction=friction, viscosity=2e-4, turn=turn)
+    rows = push(cut, turn or until, StepControl(first=0.02, largest=0.05))
+    if turn is not None:
+        again = push(cut, turn, StepControl(first=0.05, largest=0.2), 2)
+        rows = {name: np.append(column, again[name]) for name, column in rows.items()}
+    return cut, rows
 
 
 steady = cache(strip)
@@ -60,6 +71,16 @@ def test_force_and_front_of_a_steady_cut_are_those_of_the_toughness(size, dim, t
     assert abs(stretch.drift) < tolerance
     assert stretch.swept == pytest.approx(stretch.way * (1 + expected / stiffness), rel=jumps)
     assert stretch.toughness(stiffness) == pytest.approx(TOUGHNESS, rel=jumps)
+
+
+def test_two_insertions_differ_by_the_new_surface():
+    """By the force alone: the work of the second is missing G_c × width × depth, between two depths of steady cut."""
+    both = [TwoInsertions.of(history, cut) for cut, history in (strip(0.1, turn=depth) for depth in (2.0, 3.0))]
+    added = both[1].beyond(both[0])
+    area = 1.0 * WIDTH * (1 + steady_force(TOUGHNESS, WIDTH, STIFFNESS[2]) / STIFFNESS[2])
+    assert (added.first - added.second) / area == pytest.approx(TOUGHNESS, rel=0.015)
+    assert added.area == pytest.approx(area, rel=0.025)
+    assert added.apparent == pytest.approx(TOUGHNESS, rel=0.025)
 
 
 def test_the_compressed_block_counts():
