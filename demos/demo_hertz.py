@@ -467,7 +467,7 @@ def check(results: dict[str, dict[str, float]], *, quick: bool) -> None:
     for name in ("rigid", "thesis", "elastic"):
         result = results[name]
         assert result["force_off"] < (0.03 if quick else 0.02), name
-        assert abs(result["radius_over_hertz_last"] - 1) < 0.03, name
+        assert abs(result["radius_over_hertz_last"] - 1) < (0.05 if name == "elastic" else 0.02), name
         assert result["energy_closure"] < 2 * trapezoidal, name
     for name in ("mindlin", "cylinder"):
         result = results[name]
