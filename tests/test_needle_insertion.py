@@ -241,7 +241,16 @@ def test_every_number_of_ranks_gives_the_same_history(build):
     options = {"friction": FRICTION} if flat else {}
     runs = [build(comm, **options, **coarse) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)]
     together, alone = (drive(cut, cut.time_of(1.0), StepControl.fixed(0.1 if flat else 0.2)) for cut in runs)
-    for name in ("force", "tip_force", "shaft_force", "tip_friction_work", "cut", "energy_strain", "work_external"):
+    for name in (
+        "force",
+        "tip_force",
+        "shaft_force",
+        "tip_friction_work",
+        "cut",
+        "front",
+        "energy_strain",
+        "work_external",
+    ):
         scale = max(np.abs(alone[name]).max(), 1e-6)
         assert np.abs(together[name] - alone[name]).max() <= 1e-7 * scale, name
 
