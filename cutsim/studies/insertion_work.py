@@ -161,13 +161,14 @@ def force_parts(history: History, whole: float, window: float) -> dict[str, Arra
 class TwoInsertions:
     """Work of two insertions to the same depth, the second along the broken path (Azar and Hayward 2008).
 
-    The body ends in the same state both times, and begins without strain, but for what a tool that stands in the mouth
-    of a broken crack leaves in it: the difference is what was lost in the first insertion only.  The work of the first
-    has to count from before the tool is in the notch: the bond is whole then, and spreading the notch takes work.
+    The body ends in the same state both times, and begins without strain: the difference is what was lost in the first
+    insertion only.  Both count from before the tool is in the notch, whose spreading takes work, more while the bond is
+    whole.  The tool is not drawn out of it before the second push: what it had to spend up to there is what body and
+    contact hold then.
 
     Attributes:
         first: Work of the tool from its entry into the notch to the end of the first push [energy].
-        second: Work in the second push [energy].
+        second: Work in the second push, and what is held at its beginning [energy].
         losses: Friction and viscous work of the first insertion beyond that of the second [energy].
         area: New crack area, each point by its damage, which its opening alone tells.
     """
@@ -214,8 +215,10 @@ class TwoInsertions:
             cut.whole * np.diff(np.interp(ends, time, np.append(0.0, column)))[::2]
             for column in (history["work_external"], lost)
         )
+        held = np.append(0.0, history["energy_strain"] + history["energy_contact"])
+        second = float(works[1]) + cut.whole * float(np.interp(ends[2], time, held))
         area = cut.whole * float(np.interp(ends[1], history["time"], history["crack_broken"]))
-        return cls(float(works[0]), float(works[1]), float(losses[0] - losses[1]), area)
+        return cls(float(works[0]), second, float(losses[0] - losses[1]), area)
 
 
 def _first_push(depth: Array) -> NDArray[np.intp]:
