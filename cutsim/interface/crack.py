@@ -221,7 +221,8 @@ class Crack(Term):
 
     def watch(self) -> None:
         """Doubt faces that lie deep in each other. Collective."""
-        doubt_penetration(self.state.verdict, self.name, self.penetration())
+        blend = self.contact.blend / self.normal_size
+        doubt_penetration(self.state.verdict, self.name, self.penetration(), blend)
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""

@@ -35,15 +35,18 @@ def doubt_law(verdict: Verdict, name: str, law: CohesiveLaw, young: float, size:
         )
 
 
-def doubt_penetration(verdict: Verdict, name: str, depth: float) -> None:
+def doubt_penetration(verdict: Verdict, name: str, depth: float, blend: float) -> None:
     """Doubt a contact whose surfaces lie deep in each other.
+
+    A blended contact p = ε (s − c) acts as if the surfaces were moved apart by its blend c, which does not count.
 
     Args:
         verdict: Where to say so.
         name: Name of the contact.
         depth: Largest penetration over the mesh size normal to the surface [–].
+        blend: Blend of the contact over the same [–].
     """
-    if depth > DEEP:
+    if depth - blend > DEEP:
         verdict.doubt(
             f"{name}: penetration",
             f"{name}: surfaces penetrate each other by {depth:.2g} of the mesh size: a stiffer contact is needed",

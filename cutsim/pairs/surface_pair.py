@@ -155,7 +155,8 @@ class SurfacePair(AssembledTerm[SurfacePass]):
 
     def watch(self) -> None:
         """Doubt surfaces that lie deep in each other. Collective."""
-        doubt_penetration(self.state.verdict, self.name, self.penetration())
+        blend = self.contact.blend / self.normal_size
+        doubt_penetration(self.state.verdict, self.name, self.penetration(), blend)
 
     def diagnose(self) -> str | None:
         """Say how deep the surfaces penetrate, and whether any point has a partner at all. Collective."""

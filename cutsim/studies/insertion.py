@@ -37,7 +37,7 @@ from cutsim.tools.tool_parts import PARTS, ToolParts
 
 # measured: stiff enough for the force, soft enough for Newton's method; a needle is pressed harder than a blade, all
 # along its shaft (penalty times h over E, blend over tip radius)
-_CONTACT = {Blade: (8.0, 0.4), Needle: (20.0, 0.1)}
+_CONTACT = {Blade: (5.0, 0.4), Needle: (20.0, 0.1)}
 _WIDEST = np.pi / 3
 # way of an endless push over the depth of the tip when it begins
 _ENDLESS = 1e6

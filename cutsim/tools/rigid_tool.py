@@ -93,6 +93,11 @@ class RigidTool(Term, ABC):
             columns |= {f"{self.name}_sticking": (float(sticks), kind), f"{self.name}_slipping": (float(slips), kind)}
         return columns
 
+    @property
+    @abstractmethod
+    def blend(self) -> float:
+        """Blend of the contact over the mesh size, see `PenaltyContact` [–]."""
+
     @abstractmethod
     def penetration(self) -> float:
         """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""
@@ -102,7 +107,7 @@ class RigidTool(Term, ABC):
         depth = self.penetration()
         if depth > 0:
             self.state.verdict.withdraw(self._untouched)
-        doubt_penetration(self.state.verdict, self.name, depth)
+        doubt_penetration(self.state.verdict, self.name, depth, self.blend)
 
     def may_miss(self) -> None:
         """Say that a run is to be trusted also if the tool does not come to these surfaces of the body."""

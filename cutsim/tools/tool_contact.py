@@ -41,6 +41,7 @@ class Patch:
         surface: The surface.
         place: Position of its points relative to the tool [length].
         thrust: Traction of the contact pressure on the tool, −p ∇d [stress].
+        normal_size: Mean size of the cells normal to the surface [length].
         slip: Memory of friction, None without friction.
     """
 
@@ -60,7 +61,7 @@ class Patch:
         normal = ufl.diff(shape.distance(x), x)
         self._contact = with_constants(state.mesh, contact)
         self._penetration = -shape.distance(self.place)
-        self._normal_size = surface.points.mean(normal_size(state.mesh, surface.points.facets))
+        self.normal_size = surface.points.mean(normal_size(state.mesh, surface.points.facets))
         self._pressure = self._contact.pressure(self._penetration)
         self.thrust = -self._pressure * normal
         self._facing = ufl.dot(surface.restrict(_outward(state)), normal)
@@ -88,7 +89,7 @@ class Patch:
 
     def penetration(self) -> float:
         """Largest depth of a point in the tool over the mesh size normal to the surface, < 0 outside. Collective."""
-        return self.surface.points.maximum(self.contact()["depth"]) / self._normal_size
+        return self.surface.points.maximum(self.contact()["depth"]) / self.normal_size
 
     @cached_property
     def _evaluate(self):  # type: ignore[no-untyped-def]
@@ -199,6 +200,11 @@ class ToolContact(RigidTool):
         self.act(resultant(comm, forces, gdim), moment(comm, forces, arms, gdim))
         for slip in self.slips:
             slip.evaluate()
+
+    @property
+    def blend(self) -> float:
+        """Blend of the contact over the smallest mesh size of a surface [–]."""
+        return self.contact.blend / min(p.normal_size for p in self.patches)
 
     def penetration(self) -> float:
         """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""

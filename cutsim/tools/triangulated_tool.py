@@ -101,7 +101,7 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
         points = slave_points(state, facets, state.measures.exterior(facets))
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, self.position, self._position_old)
-        self._normal_size = points.mean(normal_size(state.mesh, points.facets))
+        self.contact, self._normal_size = contact, points.mean(normal_size(state.mesh, points.facets))
         slave = OuterSurface(state.V, points.facets)
         kinematics = PairKinematics(slave, master, fixed=False, search=search or size, size=size)
         laws = PairLaws(None, contact, friction, None, None)
@@ -133,6 +133,11 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
         arms[:, :gdim] = pairs.slave.x[points] + pairs.distance - self.position.value
         forces = -self.touch.point_forces()[points]
         self.act(-self.touch.force, moment(self.state.mesh.comm, forces.ravel(), arms, gdim))
+
+    @property
+    def blend(self) -> float:
+        """Blend of the contact over the mesh size [–]."""
+        return self.contact.blend / self._normal_size
 
     def penetration(self) -> float:
         """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""
