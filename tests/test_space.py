@@ -1,5 +1,8 @@
 """The cracked space against dof counts, spectra and solutions known in closed form or from one rank."""
 
+import gc
+import weakref
+
 import basix.ufl
 import numpy as np
 import pytest
@@ -9,7 +12,7 @@ from dolfinx.fem.petsc import assemble_matrix
 from dolfinx.io import VTXWriter
 from mpi4py import MPI
 
-from cutsim.base.compat import cell_partitioner
+from cutsim.base.compat import cell_partitioner, form
 from cutsim.fields.space import crack_measure_entities, cracked_space, locate_dofs
 from cutsim.solvers.newton import NonlinearProblem
 
@@ -391,3 +394,19 @@ def test_plus_side_is_checked_on_all_ranks():
     for plus in ([0.0, 0.0], [1.0, 0.0, 0.0], [np.nan, 1.0]):
         with pytest.raises(ValueError, match=r"plus\b.* (is no direction|is not allowed)"):
             crack_measure_entities(domain, facets, plus)
+
+
+def test_what_a_form_was_compiled_for_is_freed(tmp_path):
+    """With it go the communicators of its mesh, of which MPICH has some two thousand a process."""
+
+    def compiled():
+        V = fem.functionspace(box(QUADRILATERAL), ("Lagrange", 1, (2,)))
+        u = fem.Function(V)
+        energy = ufl.inner(ufl.grad(u), ufl.grad(u)) ** 2 * ufl.dx
+        gradient = ufl.derivative(energy, u, ufl.TestFunction(V))
+        form(ufl.derivative(gradient, u, ufl.TrialFunction(V)), jit_options={"cache_dir": str(tmp_path)})
+        return weakref.ref(V.mesh)
+
+    held = compiled()
+    gc.collect()
+    assert held() is None and list(tmp_path.glob("*.so")), "it was compiled, and nothing keeps it"

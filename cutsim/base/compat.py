@@ -4,7 +4,8 @@ Nothing outside this module asks which version is installed.  Each function has 
 is written for the older ones beside it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import singledispatchmethod
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,34 @@ NOT_FINITE: int = getattr(PETSc.SNES.ConvergedReason, "DIVERGED_FUNCTION_NANORIN
 #: PETSc options of line searches. Newer versions of PETSc, such as 3.25, cut each step at λ = 1 without a word;
 #: a softening bond needs the longer steps that "l2" finds. Older ones have no such bound and do not read the option.
 LINE_SEARCH_OPTIONS: dict[str, Any] = {"snes_linesearch_maxlambda": 1e8}
+
+
+# ---- Python
+
+
+def _with_subclasses(kind: type) -> Iterator[type]:
+    yield kind
+    subclasses: list[type] = kind.__subclasses__()
+    for derived in subclasses:
+        yield from _with_subclasses(derived)
+
+
+def _forget_what_was_dispatched() -> None:
+    """Python 3.13.0 and 3.13.1 keep for ever what a `singledispatchmethod` was called on (gh-127750).
+
+    UFL calls such methods on what differentiates a form, which holds the mesh, and with it MPI's communicators.
+    """
+    try:
+        from ufl.corealg.dag_traverser import DAGTraverser
+    except ImportError:  # UFL 2024, of dolfinx 0.9
+        return
+    for kind in _with_subclasses(DAGTraverser):
+        for method in vars(kind).values():
+            if isinstance(method, singledispatchmethod) and hasattr(method, "_method_cache"):
+                method._method_cache = None
+
+
+_forget_what_was_dispatched()
 
 
 # ---- forms and expressions
