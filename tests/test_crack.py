@@ -1,5 +1,9 @@
 """The modified contact law through the finite-element crack: two blocks that move as rigid bodies."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 import ufl
@@ -292,3 +296,19 @@ def test_automatic_penalty_is_a_multiple_of_young_over_size():
     crack = make_blocks().crack(None)
     assert crack.contact.stiffness == pytest.approx(10 * E / 0.5)
     assert make_blocks(n=8).crack(None).contact.stiffness == pytest.approx(4 * crack.contact.stiffness)
+
+
+def test_an_error_beside_a_new_crack_lets_the_process_end():
+    """Python drops the crack while the error is under way; its communicator must not block those that come after."""
+    program = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from conftest import make_blocks\n"
+        "from mpi4py import MPI\n"
+        "b = make_blocks()\n"
+        "try:\n    [b.crack(), b.crack(young='x')]\n"
+        "except ValueError as error:\n    print(error)\n"
+        "print(MPI.COMM_WORLD.allreduce(7))\n"
+    )
+    here = str(Path(__file__).parent)
+    done = subprocess.run([sys.executable, "-c", program, here], capture_output=True, text=True, timeout=200)
+    assert done.returncode == 0 and "young = 'x'" in done.stdout and done.stdout.endswith("7\n"), done.stderr

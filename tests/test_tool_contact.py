@@ -9,7 +9,6 @@ from mpi4py import MPI
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.assembly import moment
-from cutsim.base.verdict import Verdict
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
@@ -19,7 +18,7 @@ from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path, Plane
-from cutsim.tools.tool_contact import ToolContact, doubt_size
+from cutsim.tools.tool_contact import ToolContact
 
 CONTACT = PenaltyContact(60.0, blend=0.01)
 FRICTION = SmoothCoulomb(0.3, 1e-3)
@@ -195,10 +194,13 @@ def test_a_tool_may_not_begin_behind_the_surface():
     assert any("ball begins 0.05" in reason and "inside the body" in reason for reason in b.state.verdict.reasons)
 
 
+@pytest.mark.mpi
 def test_coarse_mesh_is_named_with_numbers(caplog):
-    blade, verdict = Blade(0.2, 0.05, 0.5), Verdict()
-    doubt_size(verdict, "blade", blade, 0.05, 10.0)
-    assert not caplog.records and verdict.trusted
-    doubt_size(verdict, "blade", blade, 0.2, 10.0)
-    assert MPI.COMM_WORLD.rank or ("0.2" in caplog.text and "0.05" in caplog.text)
-    assert not verdict.trusted
+    b = make_blocks(n=8)
+    top = Surface.exterior(b.state, b.face(1, 1.0))
+    for name, radius in (("round", 0.125), ("sharp", 0.05)):
+        path = Path(lambda t: np.array([0.5, 1.1 - t]))
+        ToolContact(b.state, Blade(0.2, radius, 0.5), path, [top], contact=PenaltyContact(1.0), name=name)
+    words = "sharp: facets of 0.125 do not resolve the tool's radius 0.05"
+    assert words in str(b.state.verdict) and "round: facets" not in str(b.state.verdict)
+    assert MPI.COMM_WORLD.rank or words in caplog.text

@@ -36,7 +36,11 @@ def checked(target: Checked) -> Checked:
     def call(*args: Any, **kwargs: Any) -> Any:
         if not hints:  # names of the module that are defined further below are known only now
             hints.update(get_type_hints(target))
-        for name, value in signature.bind(*args, **kwargs).arguments.items():
+        try:
+            given = signature.bind(*args, **kwargs).arguments
+        except TypeError as error:
+            raise TypeError(f"{target.__qualname__.removesuffix('.__init__')}: {error}") from None
+        for name, value in given.items():
             if name in hints and not _fits(value, hints[name]):
                 raise ValueError(f"{name} = {value!r} is not allowed: it must be {_words(hints[name])}")
         return target(*args, **kwargs)

@@ -63,8 +63,8 @@ def _doubt_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32
     if places:
         verdict.doubt(
             f"{name}: gaps",
-            f"{name}: {len(places)} single facets are missing in the middle of the crack, the first at {places[0]}; "
-            "they hold it together",
+            f"{name}: {len(places)} facets are missing in the middle of the crack, the first at {places[0]}; "
+            "they hold it together: add them to the facets of the crack and of the space",
         )
 
 

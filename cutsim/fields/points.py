@@ -37,6 +37,7 @@ class FacetPoints:
         degree: Degree of the quadrature.
 
     Attributes:
+        comm: Communicator of the mesh.
         degree: Degree of the quadrature.
         measure: The measure, with its quadrature rule.
         submesh: Mesh of the facets, on which history functions live.
@@ -48,6 +49,9 @@ class FacetPoints:
         self, mesh: Mesh, facets: NDArray[np.int32], measure: ufl.Measure, *, interior: bool, degree: int = DEGREE
     ) -> None:
         fdim = mesh.topology.dim - 1
+        # that of the submesh, which dies with the points, would do: but mpi4py keeps a lock with each communicator that
+        # Python objects went through, and freeing it while an exception is under way blocks all that come after
+        self.comm = mesh.comm
         self._interior, self.degree = interior, degree
         self.measure = measure(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
         unique = np.unique(np.asarray(facets, dtype=np.int32))
@@ -99,7 +103,7 @@ class FacetPoints:
     def integral(self, values: Values) -> float:
         """Integral over the facets of point values. Collective."""
         owned = slice(0, self._owned)
-        return float(self.submesh.comm.allreduce((values * self.weights)[owned].sum(), op=MPI.SUM))
+        return float(self.comm.allreduce((values * self.weights)[owned].sum(), op=MPI.SUM))
 
     def area_above(self, values: Values, level: float) -> float:
         """Area where point values exceed a level, the edge of it placed within the facets. Collective."""
@@ -113,11 +117,11 @@ class FacetPoints:
 
     def maximum(self, values: Values) -> float:
         """Largest point value, −∞ if there is no point. Collective."""
-        return float(self.submesh.comm.allreduce(float(values[: self._owned].max(initial=-np.inf)), op=MPI.MAX))
+        return float(self.comm.allreduce(float(values[: self._owned].max(initial=-np.inf)), op=MPI.MAX))
 
     def count(self, where: NDArray[np.bool_]) -> int:
         """Number of points at which something holds. Collective."""
-        return int(self.submesh.comm.allreduce(int(np.count_nonzero(where[: self._owned])), op=MPI.SUM))
+        return int(self.comm.allreduce(int(np.count_nonzero(where[: self._owned])), op=MPI.SUM))
 
     def facet_mean(self, values: Values) -> Values:
         """Mean over each local facet of point values."""
@@ -126,7 +130,7 @@ class FacetPoints:
     def mean(self, per_facet: Values) -> float:
         """Mean over all facets of one value per local facet, unweighted. Collective."""
         total = np.array([per_facet[: self._owned].sum(), self._owned])
-        total = self.submesh.comm.allreduce(total, op=MPI.SUM)
+        total = self.comm.allreduce(total, op=MPI.SUM)
         return float(total[0] / total[1])
 
     def _space(self, components: int) -> fem.FunctionSpace:

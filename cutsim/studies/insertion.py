@@ -32,7 +32,7 @@ from cutsim.materials.elastic import Material
 from cutsim.results.recording import Columns
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Path
-from cutsim.tools.tool_contact import ToolContact, doubt_size
+from cutsim.tools.tool_contact import ToolContact, doubt_units
 from cutsim.tools.tool_parts import PARTS, ToolParts
 
 # measured: stiff enough for the force, soft enough for Newton's method; a needle is pressed harder than a blade, all
@@ -158,7 +158,7 @@ class Insertion:
         plus, kind = domain.cells("right"), type(tool).__name__.lower()
         crack = Crack(state, domain.facets("crack"), plus, law, young=material.young)
         mouth = Crack(state, domain.facets("notch"), plus, None, young=material.young, name="notch")
-        doubt_size(state.verdict, kind, tool, crack.size, height)
+        doubt_units(state.verdict, kind, tool, height)
         contact = soft_contact(tool, crack, material.young)
 
         def half(face: Literal["+", "-"], side: int, name: str) -> ToolContact:

@@ -13,7 +13,7 @@ from cutsim.results.recording import Columns
 from cutsim.studies.insertion import FACES, TIP_IN_NOTCH, check_block, check_tool, soft_contact, tool_path
 from cutsim.studies.layered import LayeredBlock
 from cutsim.tools.pointed import Blade
-from cutsim.tools.tool_contact import ToolContact, doubt_size
+from cutsim.tools.tool_contact import ToolContact, doubt_units
 
 Side = Literal["+", "-"]
 
@@ -76,8 +76,7 @@ class LayeredCut:
         if mouth is None:
             raise ValueError("block has no notch; allowed is one on a mesh that was made with a notch")
         height = check_block(block.domain, notch)
-        for crack in block.cracks:
-            doubt_size(block.state.verdict, crack.name, blade, crack.size, height)
+        doubt_units(block.state.verdict, "blade", blade, height)
         rubs = Coulomb(friction) if friction else None
         contacts = tuple(
             _half(block, blade, crack, tip, insertion, rubs, face) for face in FACES for crack in block.cracks

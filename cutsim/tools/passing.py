@@ -95,7 +95,7 @@ def _nearest(patch: Touched, contact: Mapping[str, Values]) -> list[tuple[float,
     """Depth of the deepest point of each rank in the tool, and how it faces it. Collective."""
     depth, facing = contact["depth"].ravel(), contact["facing"].ravel()
     own = (float(depth.max(initial=-np.inf)), float(facing[depth.argmax()]) if len(depth) else -1.0)
-    return patch.surface.points.submesh.comm.allgather(own)
+    return patch.surface.points.comm.allgather(own)
 
 
 def _pushed(contact: Mapping[str, Values]) -> NDArray[np.bool_]:

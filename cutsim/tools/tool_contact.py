@@ -15,7 +15,7 @@ from cutsim.base.parameters import with_constants
 from cutsim.base.signatures import checked
 from cutsim.base.verdict import Verdict
 from cutsim.fields.points import Surface, Values
-from cutsim.fields.sizes import normal_size
+from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
@@ -171,6 +171,18 @@ class ToolContact(RigidTool):
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
         self._passing = Passing(self, self.patches)
+        self._doubt_resolution()
+
+    def _doubt_resolution(self) -> None:
+        """Doubt a tool whose smallest radius not even the smallest facet resolves. Collective."""
+        radius, surfaces = self.shape.resolution, [p.surface.points for p in self.patches]
+        smallest = min(-p.maximum(-facet_size(self.state.mesh, p.facets)) for p in surfaces)
+        if smallest > (1 + 1e-6) * radius:
+            self.state.verdict.doubt(
+                f"{self.name}: radius",
+                f"{self.name}: facets of {smallest:.3g} do not resolve the tool's radius {radius:.3g}: use {radius:.3g} or "
+                "less",
+            )
 
     @property
     def entity_maps(self) -> EntityMaps:
@@ -232,26 +244,18 @@ class ToolContact(RigidTool):
             slip.commit()
 
 
-def doubt_size(verdict: Verdict, name: str, shape: Shape, facet_size: float, body: float) -> None:
-    """Doubt a tool whose smallest radius the facets do not resolve, or that is larger than the whole body.
+def doubt_units(verdict: Verdict, name: str, shape: Shape, body: float) -> None:
+    """Doubt a tool whose smallest radius is larger than the whole body.
 
     Args:
         verdict: Where to say so.
         name: Name of the tool.
         shape: The tool.
-        facet_size: Mean size of the facets it meets [length].
         body: Largest extent of the body [length].
     """
-    radius = shape.resolution
-    if facet_size > (1 + 1e-6) * radius:
-        verdict.doubt(
-            f"{name}: radius",
-            f"{name}: facets of {facet_size:.3g} do not resolve the tool's radius {radius:.3g}: use {radius:.3g} or "
-            "less",
-        )
-    if radius > body:
+    if shape.resolution > body:
         verdict.doubt(
             f"{name}: size",
-            f"{name}: the tool's radius {radius:.3g} is larger than the whole body, {body:.3g}: are both in the same "
-            "units?",
+            f"{name}: the tool's radius {shape.resolution:.3g} is larger than the whole body, {body:.3g}: are both in "
+            "the same units?",
         )
