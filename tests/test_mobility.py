@@ -187,6 +187,22 @@ def test_a_gap_in_a_crack_is_warned_of(gdim, missing, caplog):
 
 
 @pytest.mark.mpi
+def test_a_facet_that_no_crack_has_is_doubted():
+    """The space is cracked along it; without the last term there is neither bond nor contact."""
+    domain = square(2).mesh
+    facets = mesh.locate_entities(domain, 1, side(1, 0.5))
+    middles = mesh.compute_midpoints(domain, 1, facets)[:, 0]
+    state = State(cracked_space(domain, ("Lagrange", 1, (2,)), facets))
+    kept, left = facets[~np.isclose(middles, 0.625)], facets[np.isclose(middles, 0.625)]
+    terms = [Solid(state, GEL), Crack(state, kept, (0.0, 1.0), None, young=E, name="cut")]
+    assert state.verdict.trusted
+    Mechanics(state, [*terms, Crack(state, left, (0.0, 1.0), None, young=E, name="rest")])
+    assert state.verdict.trusted
+    Mechanics(state, terms)
+    assert "cut: 1 facets are missing in the middle of the crack, the first at (0.625" in str(state.verdict)
+
+
+@pytest.mark.mpi
 def test_supports_agree_on_what_both_hold():
     """At a corner held twice: equal values are one support, whose reaction counts once; others are refused."""
     state = square()

@@ -37,11 +37,19 @@ def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str, ve
         )
     refuse(V.mesh.comm, problem)
     if cracked is not None:
-        _doubt_gaps(V.mesh, cracked, facets, name, verdict)
+        doubt_gaps(V.mesh, cracked, facets, name, verdict)
 
 
-def _doubt_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:
-    """Doubt facets that hold a crack together in its middle: it goes on beyond each of their ridges."""
+def doubt_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:
+    """Doubt facets that are missing in the middle of a crack: it goes on beyond each of their ridges. Collective.
+
+    Args:
+        mesh: The mesh.
+        cracked: Which local facets belong to cracks.
+        facets: Local facets of the crack that is looked at.
+        name: Its name.
+        verdict: Where to say so.
+    """
     fdim = mesh.topology.dim - 1
     mesh.topology.create_entities(fdim - 1)
     ridges, ridge_map = incidence(mesh, fdim, fdim - 1), mesh.topology.index_map(fdim - 1)

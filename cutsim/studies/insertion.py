@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
+from cutsim.base.assembly import box
 from cutsim.base.checks import above, at_least, between, nonnegative, positive, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.bodies.loads import Support
@@ -153,6 +154,10 @@ class Insertion:
         require_number("viscosity", viscosity, nonnegative)
         height = check_block(domain, notch)
         mesh, revolved = domain.mesh, isinstance(tool, Needle) and domain.mesh.geometry.dim == 2
+        if revolved:
+            left = float(box(mesh.comm, mesh.geometry.x)[0][0])
+            meridian = "the meridian plane x >= 0 of a body of revolution, as in meshes/thread.geo, for a needle in 2-D"
+            require("domain", f"a mesh that begins at x = {left:g}", left >= -1e-9 * height, meridian)
         state = State(cracked_space(mesh, ("Lagrange", 1, (mesh.geometry.dim,)), _slit(domain)), axisymmetric=revolved)
         solid = Solid(state, material, name="block", viscosity=viscosity)
         plus, kind = domain.cells("right"), type(tool).__name__.lower()

@@ -178,11 +178,8 @@ class ToolContact(RigidTool):
         radius, surfaces = self.shape.resolution, [p.surface.points for p in self.patches]
         smallest = min(-p.maximum(-facet_size(self.state.mesh, p.facets)) for p in surfaces)
         if smallest > (1 + 1e-6) * radius:
-            self.state.verdict.doubt(
-                f"{self.name}: radius",
-                f"{self.name}: facets of {smallest:.3g} do not resolve the tool's radius {radius:.3g}: use {radius:.3g} or "
-                "less",
-            )
+            words = f"facets of {smallest:.3g} do not resolve the tool's radius {radius:.3g}: use {radius:.3g} or less"
+            self.state.verdict.doubt(f"{self.name}: radius", f"{self.name}: {words}")
 
     @property
     def entity_maps(self) -> EntityMaps:
