@@ -295,7 +295,13 @@ def test_groups_overlap_and_nodes_have_any_numbers(tmp_path, ending):
         tags = [int(tag) for tag in gmsh.model.mesh.getNodes()[0]]
         gmsh.model.mesh.renumberNodes(tags, [100 + 7 * tag for tag in tags])
 
-    tagged = read_msh(drawn(tmp_path / f"slit.{ending}", draw), COMM, gdim=2)
+    try:
+        path = drawn(tmp_path / f"slit.{ending}", draw)
+    except Exception as error:  # gmsh has no kinds of errors
+        if "MED support" not in str(error):
+            raise
+        pytest.skip("gmsh of Debian cannot write MED files")
+    tagged = read_msh(path, COMM, gdim=2)
     for name in ("body", "again"):
         assert measure(tagged.mesh, "dx", tagged.cells(name)) == pytest.approx(1)
     assert measure(tagged.mesh, "dS", tagged.facets("crack")) == pytest.approx(0.5)
