@@ -228,8 +228,9 @@ def bad_values(where, hint):
             del values["list"]  # there may be none
     if any("Callable" in str(k) for k in allowed) and where not in LATER:
         values |= {"function to text": lambda t: "x", "function to nan": lambda t: np.nan}
-    if any("ndarray" in str(k) for k in allowed):
-        values |= {"fractions": np.array([0.5]), "ragged": [[1], [1, 2]]}
+    arrays = [str(k) for k in allowed if "ndarray" in str(k).lower()]  # as older and newer numpy write it
+    if arrays:
+        values |= {"ragged": [[1], [1, 2]]} | ({"fractions": np.array([0.5])} if "int32" in str(arrays) else {})
         values.pop("list", None)
     return values
 
