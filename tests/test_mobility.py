@@ -179,7 +179,7 @@ def test_a_gap_in_a_crack_is_warned_of(gdim, missing, caplog):
     middles = mesh.compute_midpoints(domain, up, facets)[:, :up]
     kept = facets[~np.isclose(middles, missing).all(axis=1)]
     state = State(cracked_space(domain, ("Lagrange", 1, (gdim,)), kept))
-    Crack(state, kept, (0.0, 0.0, 1.0)[-gdim:], None, young=E, name="cut")
+    Mechanics(state, [Solid(state, GEL), Crack(state, kept, (0.0, 0.0, 1.0)[-gdim:], None, young=E, name="cut")])
     place = ", ".join(f"{c:g}" for c in (*missing, 0.5, 0)[:3])
     assert COMM.rank or (
         f"cut: 1 facets are missing in the middle of the crack, the first at ({place})" in caplog.text

@@ -198,6 +198,12 @@ def sliced(comm, depth=0.5, toughness=(0.1, 0.04), width=None, friction=0.0):
     return cut, {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
+def test_layers_below_the_cut_need_not_be_touched():
+    cut, _ = sliced(MPI.COMM_SELF, 0.2)
+    assert [half.penetration() > 0 for half in cut.contacts] == [True, False, True, False]
+    assert "has never touched" not in str(cut.block.state.verdict)
+
+
 @pytest.mark.mpi
 def test_blade_cuts_layers():
     """The plate carries the blade's force, the audit closes, the layers add up; on any number of ranks alike."""

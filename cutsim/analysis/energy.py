@@ -47,19 +47,18 @@ class EnergyAudit:
                 entries[name] += value
         external = self.external + work
         turnover = max(abs(external), sum(abs(v) for v in entries.values()))
-        gap = abs(self.initial + external - sum(entries.values()))
-        return replace(
-            self,
-            external=external,
-            entries=entries,
-            scale=max(self.scale, turnover),
-            missed=max(self.missed, gap),
-        )
+        after = replace(self, external=external, entries=entries, scale=max(self.scale, turnover))
+        return replace(after, missed=max(self.missed, abs(after.gap)))
+
+    @property
+    def gap(self) -> float:
+        """What is missing: initial energy + external work − sum of the entries [energy]."""
+        return self.initial + self.external - sum(self.entries.values())
 
     @property
     def closure(self) -> float:
-        """(initial energy + external work − sum of the entries) / largest turnover so far [–]."""
-        return (self.initial + self.external - sum(self.entries.values())) / self.scale if self.scale > 0 else 0.0
+        """What is missing over the largest turnover so far [–]."""
+        return self.gap / self.scale if self.scale > 0 else 0.0
 
     @property
     def worst_closure(self) -> float:

@@ -96,7 +96,8 @@ class Mechanics:
         self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
         if cracks := [t for t in terms if isinstance(t, Crack)]:
             _check_one_law(state, cracks)
-            _doubt_gaps(state, cracks)
+            facets = np.unique(np.concatenate([c.points.facets for c in cracks])).astype(np.int32)
+            doubt_gaps(state.mesh, facets, " and ".join(c.name for c in cracks), state.verdict)
         v = ufl.TestFunction(state.V)
         interfaces = [t for t in terms if isinstance(t, Crack | SurfacePair)]
         self.problem = NonlinearProblem(
@@ -329,15 +330,6 @@ class Mechanics:
                 marks.array[dofmap.cell_dofs(cell)[closure[facet]]] = 1.0
         marks.scatter_reverse(la.InsertMode.add)
         return np.flatnonzero(marks.array[: dofmap.index_map.size_local]).astype(np.int32)
-
-
-def _doubt_gaps(state: State, cracks: Sequence[Crack]) -> None:
-    """Doubt facets along which the space is cracked but no crack has a law or contact. Collective."""
-    facets = np.unique(np.concatenate([c.points.facets for c in cracks])).astype(np.int32)
-    index_map = state.mesh.topology.index_map(state.mesh.topology.dim - 1)
-    cracked = np.zeros(index_map.size_local + index_map.num_ghosts, dtype=np.bool_)
-    cracked[facets] = True
-    doubt_gaps(state.mesh, cracked, facets, cracks[0].name if len(cracks) == 1 else "the cracks", state.verdict)
 
 
 def _check_one_law(state: State, cracks: Sequence[Crack]) -> None:

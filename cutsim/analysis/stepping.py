@@ -40,6 +40,10 @@ class Audit(Protocol):
         """The largest turnover so far, to which the closure is relative."""
 
     @property
+    def gap(self) -> float:
+        """What is missing."""
+
+    @property
     def closure(self) -> float:
         """What is missing, relative to the largest turnover so far [–]."""
 
@@ -323,7 +327,7 @@ def _attempt(problem: Problem, control: StepControl, end: float, *, predict: boo
 def _drift(problem: Problem) -> float:
     """What the books miss by the trial step, over the largest turnover; nothing while there was none."""
     before, after = problem.audit, problem.trial_audit
-    return abs(after.closure * after.scale - before.closure * before.scale) / after.scale if before.scale > 0 else 0.0
+    return abs(after.gap - before.gap) / after.scale if before.scale > 0 else 0.0
 
 
 def _failure(problem: Problem, outcome: Outcome) -> str | None:

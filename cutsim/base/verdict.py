@@ -28,10 +28,8 @@ class Verdict:
             words: The reason, with numbers.
             measure: How bad it is; of one kind the worst is kept.
         """
+        self._warn(kind, words)
         known = self._reasons.get(kind)
-        if kind not in self._warned:
-            logger.warning("%s", words)
-            self._warned.add(kind)
         if known is None or measure > known[0]:
             self._reasons[kind] = measure, words
 
@@ -43,14 +41,18 @@ class Verdict:
             words: The reason, with numbers.
             aloud: Whether it is warned of, the first time.
         """
-        if aloud and kind not in self._warned:
-            logger.warning("%s", words)
-            self._warned.add(kind)
+        if aloud:
+            self._warn(kind, words)
         self._pending[kind] = words
 
     def withdraw(self, kind: str) -> None:
         """Take back what was supposed; nothing happens if nothing was."""
         self._pending.pop(kind, None)
+
+    def _warn(self, kind: str, words: str) -> None:
+        if kind not in self._warned:
+            logger.warning("%s", words)
+            self._warned.add(kind)
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """A deformable body: hyperelastic bulk, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Literal
 
 import basix
@@ -252,14 +253,17 @@ class Solid(Term):
 
     def smallest_jacobian(self) -> float:
         """Smallest det F at the integration points. Collective."""
-        cell = basix.CellType[self.state.mesh.topology.cell_name()]
-        points = basix.make_quadrature(cell, self.measures[0].metadata()["quadrature_degree"])[0]
         owned = self.state.mesh.topology.index_map(self.state.mesh.topology.dim).size_local
         cells = np.arange(owned, dtype=np.int32) if self.cells is None else self.cells[self.cells < owned]
-        J = expression(ufl.det(self.deformation_gradient(self.state.u)), points, self.state.mesh)
-        values = evaluate(J, self.state.mesh, cells)
+        values = evaluate(self._jacobian, self.state.mesh, cells)
         local = float(np.nan_to_num(values, nan=-np.inf).min()) if values.size else np.inf
         return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
+
+    @cached_property
+    def _jacobian(self) -> fem.Expression:
+        cell = basix.CellType[self.state.mesh.topology.cell_name()]
+        points = basix.make_quadrature(cell, self.measures[0].metadata()["quadrature_degree"])[0]
+        return expression(ufl.det(self.deformation_gradient(self.state.u)), points, self.state.mesh)
 
     def rollback(self) -> None:
         """Forget the energies of the step."""

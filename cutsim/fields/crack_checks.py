@@ -11,16 +11,13 @@ from cutsim.fields.sizes import incidence
 from cutsim.fields.space import CRACKED, refuse, sum_over_ranks
 
 
-def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:
+def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) -> None:
     """Refuse a crack on facets along which the space holds together: it could not open. Collective.
-
-    A single facet that is missing in the middle of the cracks, and holds them together, is a doubt.
 
     Args:
         V: The space.
         facets: Local facets of the crack.
         name: Name of the crack.
-        verdict: Where to say so.
 
     Raises:
         ValueError: On all ranks, with the number of these facets and the place of one.
@@ -36,18 +33,15 @@ def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str, ve
             "cracked_space"
         )
     refuse(V.mesh.comm, problem)
-    if cracked is not None:
-        doubt_gaps(V.mesh, cracked, facets, name, verdict)
 
 
-def doubt_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:
-    """Doubt facets that are missing in the middle of a crack: it goes on beyond each of their ridges. Collective.
+def doubt_gaps(mesh: Mesh, facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:
+    """Doubt facets that are missing in the middle of cracks: they go on beyond each of their ridges. Collective.
 
     Args:
         mesh: The mesh.
-        cracked: Which local facets belong to cracks.
-        facets: Local facets of the crack that is looked at.
-        name: Its name.
+        facets: Local facets of all cracks, ghosts included.
+        name: What they are called.
         verdict: Where to say so.
     """
     fdim = mesh.topology.dim - 1
@@ -60,12 +54,10 @@ def doubt_gaps(mesh: Mesh, cracked: NDArray[np.bool_], facets: NDArray[np.int32]
         return sum_over_ranks(ridge_map, np.bincount(here, minlength=count))
 
     outer = exterior_facet_indices(mesh.topology)
-    outside, ends = per_ridge(outer) > 0, per_ridge(np.flatnonzero(cracked)) == 1
-    own = per_ridge(facets) > 0
-    front = ends[ridges[:owned]]
-    gap = ~cracked[:owned] & (front | outside[ridges[:owned]]).all(axis=1)
-    gap &= (front & own[ridges[:owned]]).sum(axis=1) >= 2
-    gap[outer[outer < owned]] = False
+    outside, front = (per_ridge(outer) > 0)[ridges[:owned]], (per_ridge(facets) == 1)[ridges[:owned]]
+    gap = (front | outside).all(axis=1) & (front.sum(axis=1) >= 2)
+    for known in (facets, outer):
+        gap[known[known < owned]] = False
     found = np.flatnonzero(gap).astype(np.int32)
     places = [p for p in mesh.comm.allgather([_place(mesh, found[i : i + 1]) for i in range(len(found))]) for p in p]
     if places:

@@ -55,10 +55,14 @@ class HeatBalance:
         return replace(self, entries=entries, scale=max(self.scale, turnover))
 
     @property
+    def gap(self) -> float:
+        """What is missing: heat gained − stored − left [energy]."""
+        return sum(self.entries[name] for name in GAINED) - sum(self.entries[name] for name in SPENT)
+
+    @property
     def closure(self) -> float:
-        """(heat gained − stored − left) / largest turnover so far [–]."""
-        gap = sum(self.entries[name] for name in GAINED) - sum(self.entries[name] for name in SPENT)
-        return gap / self.scale if self.scale > 0 else 0.0
+        """What is missing over the largest turnover so far [–]."""
+        return self.gap / self.scale if self.scale > 0 else 0.0
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity)."""

@@ -102,7 +102,7 @@ class Crack(Term):
         self._current = normal == "current"
         self._allowed_penetration = penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
-        check_cracked(state.V, facets, name, state.verdict)
+        check_cracked(state.V, facets, name)
         self.points = FacetPoints(
             state.mesh, np.asarray(facets, dtype=np.int32), state.measures.interior(self.entities), interior=True
         )

@@ -8,15 +8,12 @@ from dolfinx import fem
 from cutsim.base.checks import positive, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
-from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.points import Values
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
-
-logger = collective_logger(__name__)
 
 
 class CrackFriction(Term):

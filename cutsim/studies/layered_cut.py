@@ -119,7 +119,7 @@ def _half(
     surfaces = [crack.surface(mark)]
     if crack is block.cracks[0] and block.notch is not None:
         surfaces += [block.notch.surface(mark), Surface.exterior(block.state, block.domain.facets(f"top_{name}"))]
-    return ToolContact(
+    half = ToolContact(
         block.state,
         replace(blade, side=side),
         tool_path(blade, side, (tip, insertion, None), block.state.mesh.geometry.dim),
@@ -128,6 +128,9 @@ def _half(
         friction=friction,
         name=f"blade_{name}_{crack.name}",
     )
+    if crack is not block.cracks[0]:  # how deep the cut will go is not known
+        half.may_miss()
+    return half
 
 
 def _end(block: LayeredBlock, side: str, way: float, duration: float) -> Support:
