@@ -163,6 +163,29 @@ def test_no_step_carries_a_tool_through_a_sheet(caplog):
     assert large["tool_force_y"][-1] == pytest.approx(small["tool_force_y"][-1], rel=1e-6)
 
 
+def small_ball(step):
+    """A ball smaller than half a facet of the body's top, which goes in between two points of it: forces."""
+    domain = mesh.create_rectangle(
+        MPI.COMM_WORLD, [(0, -1), (2, 0)], (8, 4), mesh.CellType.quadrilateral, ghost_mode=mesh.GhostMode.shared_facet
+    )
+    state = State(fem.functionspace(domain, ("Lagrange", 1, (2,))))
+    top, base = (mesh.locate_entities_boundary(domain, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0, -1))
+    path = Path.polyline([0, 1], [(1, 0.11), (1, -0.4)])
+    ball = ToolContact(state, Ball(0.1), path, [Surface.exterior(state, top)], contact=PenaltyContact(40 * E))
+    mechanics = Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], [Support(state, base, i) for i in (0, 1)])
+    return history(mechanics, 0.5, StepControl(step, step, smallest=1e-3))["tool_force_y"]
+
+
+@pytest.mark.mpi
+def test_no_step_carries_a_small_ball_between_the_points_of_the_surface(caplog):
+    """A large step is cut until the ball presses on the points beside it; that the mesh is too coarse is doubted."""
+    caplog.set_level("INFO")
+    force = small_ball(0.5)[-1]
+    assert MPI.COMM_WORLD.rank or "tool has passed through the surface of the body between its points" in caplog.text
+    assert MPI.COMM_WORLD.rank or "facets of 0.25 do not resolve the tool's radius 0.1" in caplog.text
+    assert force > 0.2
+
+
 def ball_in(b, depth):
     """A ball of radius 0.3 that begins so deep in the top of a block, and moves on by 0.05."""
     path = Path.polyline([0, 1], [(0.5, 1.3 - depth), (0.5, 1.25 - depth)])

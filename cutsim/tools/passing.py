@@ -51,7 +51,8 @@ class Passing:
                 f"to {depth:.3g} deep in it, from where it would push them outwards; let it begin outside the body, or "
                 "less deep in it"
             )
-        nearest, facing = max(own for p, now in zip(patches, self._seen, strict=True) for own in _nearest(p, now))
+        self._nearest = self._nearest_old = _nearest(patches, self._seen)
+        nearest, facing = self._nearest
         if facing > _BEHIND and nearest < 0:
             tool.state.verdict.doubt(
                 f"{tool.name}: start",
@@ -68,12 +69,18 @@ class Passing:
         turned = [(then["facing"] < -_BEHIND) & (now["facing"] > _BEHIND) for then, now in both]
         if self._count(turned):
             pushed = [p | t for p, t in zip(pushed, self._met(turned), strict=True)]
-        count = self._count(pushed)
-        return f"{self._tool.name} has passed through the surface of the body at {count} points" if count else None
+        passed = f"{self._tool.name} has passed through the surface of the body"
+        if count := self._count(pushed):
+            return f"{passed} at {count} points"
+        self._nearest = _nearest(self._patches, self._seen)
+        (depth_old, facing_old), (depth, facing) = self._nearest_old, self._nearest
+        # a tool smaller than a facet may meet no point before its middle is behind them
+        between = facing > 0 and facing - facing_old > 2 * _TURN and min(depth_old, depth) <= 0
+        return f"{passed} between its points" if between else None
 
     def commit(self) -> None:
         """Adopt the trial step."""
-        self._seen_old = self._seen
+        self._seen_old, self._nearest_old = self._seen, self._nearest
 
     def _met(self, some: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
         """Which of some points have been in the tool during the step."""
@@ -91,11 +98,13 @@ class Passing:
         return sum(p.surface.points.count(where) for p, where in zip(self._patches, points, strict=True))
 
 
-def _nearest(patch: Touched, contact: Mapping[str, Values]) -> list[tuple[float, float]]:
-    """Depth of the deepest point of each rank in the tool, and how it faces it. Collective."""
-    depth, facing = contact["depth"].ravel(), contact["facing"].ravel()
-    own = (float(depth.max(initial=-np.inf)), float(facing[depth.argmax()]) if len(depth) else -1.0)
-    return patch.surface.points.comm.allgather(own)
+def _nearest(patches: Sequence[Touched], contact: Sequence[Mapping[str, Values]]) -> tuple[float, float]:
+    """Depth of the deepest of all points in the tool, negative outside, and how it faces the tool. Collective."""
+    own = []
+    for now in contact:
+        depth, facing = now["depth"].ravel(), now["facing"].ravel()
+        own.append((float(depth.max(initial=-np.inf)), float(facing[depth.argmax()]) if len(depth) else -1.0))
+    return max(max(of_rank) for of_rank in patches[0].surface.points.comm.allgather(own))
 
 
 def _pushed(contact: Mapping[str, Values]) -> NDArray[np.bool_]:
