@@ -2,7 +2,7 @@
 # DOLFINX=wheel|system and PYTHON=/path/to/python3 choose what it takes; docs/install.md says how.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-mpi bench lint docs dist clean always
+.PHONY: help setup demo test test-mpi bench lint api docs dist clean always
 
 NAME ?= blade
 JOBS ?= $(shell nproc)
@@ -47,6 +47,9 @@ $(DOCS_STAMP): $(STAMP)
 	$(PYTHON_IN_VENV) -m pip install --quiet --disable-pip-version-check -c .venv/constraints.txt -e '.[docs]'
 	@touch $@
 
+api: $(STAMP) ## write docs/api.md from the docstrings
+	$(PYTHON_IN_VENV) docs/make_api.py
+
 docs: $(DOCS_STAMP) ## build docs/_build/html
 	$(PYTHON_IN_VENV) -m sphinx -W --keep-going -b html docs docs/_build/html
 
@@ -54,5 +57,5 @@ dist: ## build sdist and wheel into dist/, and cut with the wheel from an empty 
 	bash scripts/dist.sh
 
 clean: ## remove results, caches, built docs and packages; keeps .venv
-	rm -rf results dist docs/_build docs/jupyter_execute .mypy_cache .ruff_cache .pytest_cache
+	rm -rf results dist docs/_build docs/jupyter_execute docs/reference .mypy_cache .ruff_cache .pytest_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

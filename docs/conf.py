@@ -6,15 +6,24 @@ from pathlib import Path
 
 import cutsim
 
-sys.path.insert(0, str(Path(__file__).parent))  # for demo_reader
+sys.path.insert(0, str(Path(__file__).parent))  # for demo_reader and make_api
+import make_api
 
 project = "cutsim"
 author = "cutsim contributors"
 project_copyright = author
 release = version = cutsim.__version__
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-exclude_patterns = ["_build", "conf.py", "demo_reader.py", "figures", "**/__pycache__", "**/.ipynb_checkpoints"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx-mathjax-offline",  # formulas need no network
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["_build", "*.py", "figures", "**/__pycache__", "**/.ipynb_checkpoints"]
 
 # demos/ is linked into this folder; its light scripts are read as notebooks and shown without running them
 nb_custom_formats = {".py": "demo_reader.read"}
@@ -44,4 +53,5 @@ def plain_text(app, what, name, obj, options, lines):
 
 def setup(app):
     """Called by Sphinx."""
+    make_api.reference_pages()
     app.connect("autodoc-process-docstring", plain_text, priority=100)

@@ -188,3 +188,10 @@ def test_tangent_of_cone(shape, friction):
     surface = Surface.exterior(b.state, b.face(2, 1.0))
     tool = test_tangents.touch(b, shape, (0.4, 0.5, 0.9), [surface], friction)
     test_tangents.assert_slope_two(tool, b.state, test_tangents.smooth(b.state.V, 4, 0.02), 0.05)
+
+
+def test_page_of_the_api_is_up_to_date(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    import make_api
+
+    assert (DOCS / "api.md").read_text(encoding="utf-8") == make_api.page(), "make api writes it anew"

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
@@ -70,6 +71,31 @@ def step(path):
     plt.close(fig)
 
 
+def law(path):
+    """Traction between the faces of a crack against their opening: contact on the left, cohesion on the right."""
+    fig, ax = plt.subplots(figsize=(6.4, 3.4))
+    opening, closed = np.linspace(0, 6, 200), np.linspace(-0.22, 0, 2)
+    traction = opening * np.exp(1 - opening)
+    ax.fill_between(opening, traction, color="#dff0df")
+    ax.plot(opening, traction, color="#2a7f3a", lw=2.2)
+    ax.plot(closed, 4 * closed, color="#b3261e", lw=2.2)
+    ax.plot([0, 2.2], [0, 2.2 * np.exp(-1.2)], color="#555555", lw=1.3, ls="--")
+    ax.axhline(0, color="black", lw=0.8)
+    ax.axvline(0, color="black", lw=0.8)
+    ax.set(xlim=(-1.1, 6), ylim=(-1.0, 1.25), xticks=[], yticks=[])
+    ax.text(0.12, 1.14, "traction", size=9)
+    ax.text(5.95, -0.14, "opening", size=9, ha="right")
+    ax.text(1.25, 1.05, "opening: cohesion, up to the strength", size=9.5, color="#2a7f3a")
+    ax.text(1.45, 0.12, "area: fracture energy", size=9)
+    ax.text(0.55, -0.42, "dashed: a damaged bond, unloaded and loaded again", size=9, color="#555555")
+    ax.text(-0.32, -0.75, "closed:\ncontact", size=9.5, color="#b3261e", ha="right")
+    for side in ax.spines.values():
+        side.set_visible(False)
+    fig.savefig(path, bbox_inches="tight", metadata={"Date": None})
+    plt.close(fig)
+
+
 if __name__ == "__main__":
     matplotlib.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "cutsim", "font.family": "sans-serif"})
     step(HERE / "step.svg")
+    law(HERE / "law.svg")
