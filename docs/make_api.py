@@ -14,9 +14,10 @@ import cutsim
 HERE = Path(__file__).parent
 HEAD = """# API
 
-Signatures and one line each of what scripts use, grouped by what you want to do. Names without a module are imported from
-`cutsim` itself: `from cutsim import Blade`. The built site (`make docs`) has the whole docstrings, with units, shapes, signs
-and errors, of these names and of all modules. Equations are in [](theory.md), in whose section numbers the docstrings speak.
+Signatures and one line each of what scripts use, grouped by what you want to do. Names without a module are
+imported from `cutsim` itself: `from cutsim import Blade`. The built site (`make docs`) has the whole docstrings, with
+units, shapes, signs and errors, of these names and of all modules. Section numbers in them are those of the page on
+[theory](theory.md).
 
 *This page is written by `make api` from the docstrings. Do not edit it.*
 """
