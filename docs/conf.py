@@ -40,6 +40,8 @@ napoleon_google_docstring = True
 napoleon_numpy_docstring = False
 
 html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["style.css"]
 html_title = f"cutsim {release}"
 html_theme_options = {"navigation_with_keys": True}
 
