@@ -1,4 +1,4 @@
-"""Parameters from the files of a testing machine (docs/identification.md)."""
+"""Identification of material parameters from the files of a testing machine (docs/identification.md)."""
 
 from cutsim.identify.calibration import MaterialFit, StressTest, fit_material
 from cutsim.identify.fitting import Fit, fit_model

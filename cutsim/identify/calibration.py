@@ -1,4 +1,4 @@
-"""Parameters of a material from stress–stretch tests."""
+"""Calibration of a material: its parameters from stress–stretch tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Least squares: parameters of a model, how sure they are, and how well the model fits."""
+"""Least squares: parameters of a model, their confidence intervals, and the goodness of fit."""
 
 from __future__ import annotations
 

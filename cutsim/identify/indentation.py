@@ -1,4 +1,4 @@
-"""Shear modulus from a flat punch, Poisson's ratio from pairs of lines (docs/identification.md)."""
+"""Indentation with a flat punch, and Poisson's ratio from pairs of lines (docs/identification.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parameters of a simulation from a measured curve, such as toughness and friction from force against depth."""
+"""Inverse analysis: parameters of a simulation, such as toughness and friction, from a measured curve."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _FAILURE = 10.0
 
 
 class Evaluations:
-    """Simulated curves by parameters, kept in a file, so that a fit that was stopped goes on where it was. Collective.
+    """Simulated curves and their parameters, kept in a file so that an interrupted fit can continue. Collective.
 
     Args:
         simulate: Parameters -> abscissae, which grow, and ordinates; the same on all ranks.

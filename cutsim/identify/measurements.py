@@ -1,4 +1,4 @@
-"""Tables of a testing machine: columns by name, in the units of the run, refused with file, line and cell."""
+"""Tables of a testing machine: columns by name, in the units of the run; errors name file, line and cell."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Line = tuple[int, list[str]]
 
 @dataclass(frozen=True)
 class _Column:
-    """Cells of a column as written, with what messages say of them."""
+    """Cells of a column as they are written, and their place for error messages."""
 
     path: Path | str
     title: str

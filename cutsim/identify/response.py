@@ -1,4 +1,4 @@
-"""Stress of incompressible solids in the homogeneous tests of a testing machine (docs/identification.md).
+"""Response of incompressible solids in the homogeneous tests of a testing machine (docs/identification.md).
 
 A block is stretched along the first axis by λ₁ at constant volume; F = diag(λ₁, λ₂, 1/(λ₁λ₂)).  With W a function of
 λ₁ and λ₂ alone and the third faces free, the nominal stresses are P₁ = ∂W/∂λ₁ and P₂ = ∂W/∂λ₂: the pressure has dropped

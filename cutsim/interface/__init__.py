@@ -1,1 +1,1 @@
-"""The law between two faces, closing and opening, and the crack that carries it."""
+"""Interface laws between two faces, for closing and opening, and the crack to which they apply."""

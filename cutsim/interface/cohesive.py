@@ -1,4 +1,4 @@
-"""Cohesive laws: traction against displacement jump on a crack that is opening (docs/theory.md §3.1, 3.2).
+"""Cohesive laws: the traction for a displacement jump on an opening crack (docs/theory.md §3.1, 3.2).
 
 A law gives the *secant* stiffnesses of its envelope, k_n = T_n/δ_n and k_t = T_t/|δ_t|, which fall as the bond opens
 and slides.  A point remembers the smallest of each so far, K_n and K_t, and carries T = K_n ⟨δ_n⟩ n + K_t δ_t: it
@@ -24,7 +24,7 @@ _AGREE = 1e-3  # relative disagreement of strength, opening and toughness that i
 
 @runtime_checkable
 class CohesiveLaw(Protocol):
-    """What a crack needs of a cohesive law; see docs/adding_a_cohesive_law.md."""
+    """Protocol of a cohesive law; see docs/adding_a_cohesive_law.md."""
 
     @property
     def strength(self) -> float:
@@ -167,7 +167,7 @@ class Exponential:
 
 
 class ByToughness:
-    """What a law has whose parameters are a strength and a toughness in each mode."""
+    """Base of laws whose parameters are a strength and a toughness in each mode."""
 
     t_n: float
     G_I: float

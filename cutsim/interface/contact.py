@@ -1,4 +1,4 @@
-"""Contact laws: normal pressure against penetration (docs/theory.md §3, 4)."""
+"""Contact laws: the normal pressure for a penetration (docs/theory.md §3, 4)."""
 
 from dataclasses import dataclass
 

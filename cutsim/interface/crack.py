@@ -1,4 +1,4 @@
-"""A crack: one law for closing and opening on predefined facets (docs/theory.md §1, 3; thesis 4.10, 4.41).
+"""Crack on predefined facets, with one law for closing and opening (docs/theory.md §1, 3; thesis 4.10, 4.41).
 
 Closed, the law is penalty contact; open, a cohesive law with irreversible damage.  '+' and '−' are fixed by region, the
 jump is δ = u⁻ − u⁺, the normal n points from '+' to '−', and the traction acts as T on the '+' face, as −T on the '−'
@@ -38,7 +38,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class CrackResponse(Response):
-    """The law of a crack at a displacement, with its kinematics.
+    """Response of a crack at a displacement: kinematics and tractions.
 
     Attributes:
         jump: Displacement jump δ = u⁻ − u⁺ [length].

@@ -1,4 +1,4 @@
-"""What a bond loses on the way of its jump over a step, exactly for a step of any size (docs/theory.md §3.2).
+"""Dissipation of a bond along the path of its jump over a step, exact for a step of any size (docs/theory.md §3.2).
 
 With the smallest secants K_n and K_t as memory the loss is −½ ∫ (dK_n δ_n² + dK_t δ_t²), mode by mode.  A mode loses
 energy only after its secant has fallen below its memory; from there on, by parts, it is ∫ k δ dδ − [½ k δ²].
@@ -25,7 +25,7 @@ _LOCATE, _HALVINGS = 40, 48
 
 @dataclass(frozen=True)
 class Way:
-    """Straight ways of the jump over a step, in components that turn with the interface.
+    """Straight paths of the jump over a step, in components that turn with the interface.
 
     Attributes:
         start: Opening and slide at the start, shape (points, components) [length].

@@ -1,4 +1,4 @@
-"""What makes a bond or a contact questionable: numbers that do not go together, faces that lie in each other."""
+"""Checks of a bond or a contact that make a result questionable: inconsistent parameters, penetrating faces."""
 
 from cutsim.base.verdict import Verdict
 from cutsim.interface.cohesive import CohesiveLaw, process_zone_element

@@ -1,4 +1,4 @@
-"""Friction laws: traction against slip and pressure (docs/theory.md §3.3).
+"""Friction laws: the traction for a slip under a pressure (docs/theory.md §3.3).
 
 A law sees the slip since the point at which its traction would vanish, the *anchor*, and resists it.  After a step the
 anchor follows: what the law does not hold elastically has slipped for good.
@@ -22,7 +22,7 @@ _AT_LIMIT = 1e-12
 
 @runtime_checkable
 class FrictionLaw(Protocol):
-    """What friction needs of a law."""
+    """Protocol of a friction law."""
 
     @property
     def compliance(self) -> float:

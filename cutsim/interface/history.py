@@ -1,4 +1,4 @@
-"""What the points of an interface remember: secants, multiplier, losses and work of contact (docs/theory.md §3.2)."""
+"""History variables of an interface: secants, contact multiplier, dissipation, contact work (docs/theory.md §3.2)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from cutsim.interface.dissipation import Way, losses
 
 @dataclass(frozen=True)
 class PathRule:
-    """Where on the straight path of the displacement over a step the work of contact is evaluated.
+    """Quadrature rule for the work of contact along the straight path of the displacement over a step.
 
     Args:
         places: Fractions of the step.
@@ -37,7 +37,7 @@ Along = Callable[[float], dict[str, Values]]
 
 
 class InterfaceHistory:
-    """Memory, losses and contact multiplier at the points of an interface, trial and committed.
+    """Secants, dissipation and contact multiplier at the points of an interface, trial and committed.
 
     Args:
         points: Integration points.

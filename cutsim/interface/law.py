@@ -1,4 +1,4 @@
-"""One interface law for closing and opening, whatever finds the opening (docs/theory.md §3; thesis 4.10, 4.41)."""
+"""Interface law for closing and opening, for any kinematics (docs/theory.md §3; thesis 4.10, 4.41)."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ _REST = 1e-12
 
 @dataclass(frozen=True)
 class Response:
-    """The law at an opening and a slide: symbolic, at an integration point.
+    """Symbolic response of the law to an opening and a slide at an integration point.
 
     Attributes:
         sliding: Magnitude of the slide [length].

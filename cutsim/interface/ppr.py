@@ -1,4 +1,4 @@
-"""The cohesive law of Park, Paulino and Roesler (2009): shapes, strengths and toughnesses of both modes at will."""
+"""Cohesive law of Park, Paulino and Roesler (2009), with any shape, strength and toughness in both modes."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from cutsim.interface.cohesive import ByToughness
 @checked
 @dataclass(frozen=True)
 class ParkPaulinoRoesler(ByToughness):
-    """Law with the potential Ψ of Park, Paulino and Roesler (J. Mech. Phys. Solids 57, 2009), often called PPR.
+    """Cohesive law with the potential Ψ of Park, Paulino and Roesler (J. Mech. Phys. Solids 57, 2009), known as PPR.
 
     With x = δ_n/δ_nc, y = δ_t/δ_tc, f(x) = (1−x)^α (1 + αx/m)^m, g(y) = (1−y)^β (1 + βy/n)^n and Φ = max(φ_n, φ_t),
     T_n = −f'(x)/δ_nc ⟨Φ g(y) − ⟨φ_t−φ_n⟩⟩ and T_t = −g'(y)/δ_tc ⟨Φ f(x) − ⟨φ_n−φ_t⟩⟩, each zero from its final

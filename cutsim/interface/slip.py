@@ -1,4 +1,4 @@
-"""Slip at integration points: the memory of friction, its dissipation, stick and slip (docs/theory.md §3.3)."""
+"""Slip history at integration points: anchor, traction and dissipation of friction (docs/theory.md §3.3)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,7 +29,7 @@ def _closed(before: Expr, now: Expr) -> Expr:
 
 
 class SlipHistory:
-    """Friction at the points of a surface, whatever its kinematics.
+    """Friction state at the points of a surface, for any kinematics.
 
     The slip is a vector s of components in a frame that turns with the surface.  The memory is the slip s₀ at the start
     of the step and the elastic slip e that carries a traction; the trial traction is ε_T (f (s − s₀) + e).  After a

@@ -1,1 +1,1 @@
-"""Strain energies of solids: a frozen dataclass of parameters each."""
+"""Materials: strain energies of solids, each a frozen dataclass of its parameters."""

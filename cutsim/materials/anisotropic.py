@@ -1,4 +1,4 @@
-"""Solids that are anisotropic as a whole: transversely isotropic, and orthotropic of Fung's type."""
+"""Anisotropic solids: transversely isotropic, and orthotropic of Fung's type."""
 
 from dataclasses import dataclass
 

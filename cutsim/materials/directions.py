@@ -1,4 +1,4 @@
-"""Directions of the reference configuration, along which solids are stiffer or softer.
+"""Material directions in the reference configuration, for anisotropic solids and fibres.
 
 A direction is a vector of any length: a tuple of two or three numbers, or, where it changes from place to place, a UFL
 vector such as a `dolfinx.fem.Function`.

@@ -1,4 +1,4 @@
-"""Bulk materials: strain energies per reference volume (docs/theory.md §2).
+"""Elastic materials: strain energies per reference volume (docs/theory.md §2).
 
 A material is a frozen dataclass of parameters that returns its strain energy in two parts: the part to be
 integrated fully and the volumetric part, which may be integrated with fewer points so that low-order elements
@@ -19,7 +19,7 @@ from cutsim.base.signatures import checked
 
 @runtime_checkable
 class Material(Protocol):
-    """What the bulk needs of a material; see docs/adding_a_material.md."""
+    """Protocol of a material; see docs/adding_a_material.md."""
 
     @property
     def young(self) -> float:
@@ -52,7 +52,7 @@ def volumetric_energy(material: Material, F: NDArray[np.float64]) -> float:
 
 
 class WithoutPlaneStress:
-    """A material that leaves the out-of-plane stretch of plane stress open."""
+    """Base of materials that are not available in plane stress."""
 
     def plane_stress_stretch(self, F: Expr) -> Expr:
         """Not available.
@@ -66,7 +66,7 @@ class WithoutPlaneStress:
 
 @dataclass(frozen=True)
 class _Isotropic:
-    """Two elastic constants of the small-strain limit.
+    """Base of isotropic materials with two elastic constants.
 
     Args:
         young: Young's modulus E > 0 [stress].

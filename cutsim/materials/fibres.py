@@ -1,4 +1,4 @@
-"""Fibres that reinforce a solid: strain energies per reference volume of one family each (docs/materials.md).
+"""Fibre families that reinforce a solid: their strain energies per reference volume (docs/materials.md).
 
 `Reinforced` adds families to any other material.  Fibres carry tension only: their energy starts with zero slope where
 they begin to stretch, so that the stress has no jump there.  For directions see `cutsim.materials.directions`.
@@ -21,7 +21,7 @@ from cutsim.materials.elastic import Material, WithoutPlaneStress, isochoric_inv
 
 
 class FibreLaw(Protocol):
-    """What `Reinforced` needs of a family of fibres."""
+    """Protocol of a family of fibres, as `Reinforced` uses it."""
 
     def energy(self, F: Expr) -> Expr:
         """Strain energy per reference volume."""
@@ -30,7 +30,7 @@ class FibreLaw(Protocol):
 @checked
 @dataclass(frozen=True)
 class Reinforced(WithoutPlaneStress):
-    """A material with families of fibres; their energies add up, the volumetric part is that of the matrix.
+    """Matrix material with families of fibres; their energies add up, the volumetric part is that of the matrix.
 
     Args:
         matrix: The material between the fibres.
@@ -100,7 +100,7 @@ class ExponentialFibres:
 @checked
 @dataclass(frozen=True)
 class DispersedFibres:
-    """Fibres that scatter about a direction, W = k₁/(2k₂) (exp(k₂ ⟨E⟩²) − 1) (Gasser, Ogden and Holzapfel 2006).
+    """Fibres dispersed about a direction, W = k₁/(2k₂) (exp(k₂ ⟨E⟩²) − 1) (Gasser, Ogden and Holzapfel 2006).
 
     E = κ (Ī₁ − 3) + (1 − 3κ) (Ī₄ − 1), with the invariants of the isochoric part of F.  κ = 0 are parallel fibres, the
     model of Holzapfel, Gasser and Ogden (2000); κ = ⅓ is isotropic.  Polyconvex together with the matrix for

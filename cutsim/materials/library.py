@@ -1,4 +1,4 @@
-"""Named rubbers and tissues with published values (docs/materials.md).
+"""Library of named rubbers and tissues with published values (docs/materials.md).
 
 Units are N, mm, MPa.  A name gives a `Record`: the material, a strength where one is known, and the source.
 """
@@ -21,7 +21,7 @@ EPIDERMIS_POISSON = 0.48
 
 @dataclass(frozen=True)
 class Record:
-    """A material with published values.
+    """A material of the library, with its source.
 
     Args:
         material: The material [MPa].

@@ -1,4 +1,4 @@
-"""What the springs of a viscoelastic solid hold and its dashpots lose (docs/materials.md).
+"""Energy stored in the springs and dissipated in the dashpots of a viscoelastic solid (docs/materials.md).
 
 A term h of quasi-linear viscoelasticity is h = g (S(E) − z), where the stress z follows S, τ ż = S − z.
 With the strain E_z at which the spring would be in equilibrium with z, S(E_z) = z, the power of h is
@@ -43,7 +43,7 @@ class _Terms:
 
 
 class Maxwell:
-    """Books of the energy of overstresses, with a trial and a committed value. Collective.
+    """Stored and dissipated energy of the overstresses, trial and committed. Collective.
 
     Args:
         spring: The strain energy that relaxes.

@@ -1,4 +1,4 @@
-"""Nearly incompressible and principal-stretch energies of rubbers and isotropic tissues (docs/materials.md).
+"""Rubbers and isotropic tissues: energies in invariants and in principal stretches (docs/materials.md).
 
 The volumetric part of the invariant models is K/2 (ln J)², which is convex in J up to J = e; the barred invariants are
 those of J^(−1/3) F.
@@ -26,7 +26,7 @@ from cutsim.materials.stretches import stretch_power_sums
 
 
 class _WithModuli(WithoutPlaneStress, ABC):
-    """Small-strain limit of a material with a shear and a bulk modulus."""
+    """Base of materials with a shear and a bulk modulus in the small-strain limit."""
 
     @property
     @abstractmethod
@@ -49,7 +49,7 @@ class _WithModuli(WithoutPlaneStress, ABC):
 
 
 class _NearlyIncompressible(_WithModuli):
-    """Volumetric energy beside that of the isochoric part."""
+    """Base of nearly incompressible materials, with the volumetric energy K/2 (ln J)²."""
 
     bulk: float
 

@@ -1,4 +1,4 @@
-"""A strain energy by itself: energy, and strain that belongs to a stress, at given points (docs/materials.md)."""
+"""Strain energy evaluated at points, and the strain that belongs to a stress (docs/materials.md)."""
 
 import logging
 from collections.abc import Callable, Sequence
@@ -37,7 +37,7 @@ def symmetric_tensor(components: Expr, pairs: Sequence[tuple[int, int]]) -> Expr
 
 
 class Spring:
-    """A strain energy as a function of strain, and the strain that belongs to a stress, at the points of cells.
+    """Strain energy as a function of strain, and its inverse from stress to strain, at the points of cells.
 
     A strain is the vector of the components of E that are not zero, and behind them the pressure of the constraint on
     the volume, which is zero unless the energy does not depend on the volume.  A stress is that of the work conjugates

@@ -1,4 +1,4 @@
-"""Sums of powers of the principal stretches, smooth where stretches coincide, in pure UFL.
+"""Sums of powers of the principal stretches in pure UFL, smooth where stretches coincide.
 
 Closed formulas for eigenvalues have no derivative where two of them coincide, as in the reference state and in uniaxial
 tension, and lose all digits nearby.  A sum over all three is smooth.  Here it is written so that its derivatives are:

@@ -1,4 +1,4 @@
-"""How heat changes a solid: thermal expansion and a shear modulus that depends on temperature (docs/theory.md §3.4)."""
+"""Thermoelasticity: thermal expansion and a shear modulus that depends on temperature (docs/theory.md §3.4)."""
 
 from dataclasses import dataclass
 

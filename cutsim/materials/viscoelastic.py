@@ -1,4 +1,4 @@
-"""Quasi-linear viscoelasticity: overstresses of a Prony series at the integration points of a body (docs/materials.md).
+"""Quasi-linear viscoelasticity: overstresses of a Prony series at integration points (docs/materials.md).
 
 The second Piola–Kirchhoff stress S of the fully integrated part of a strain energy relaxes, that of the volumetric part
 does not:
@@ -63,7 +63,7 @@ class Prony:
 
 
 class Overstress:
-    """Overstresses of one body, with a trial and a committed value.
+    """Overstresses of one body, trial and committed.
 
     Args:
         state: Displacement and time.

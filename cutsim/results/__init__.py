@@ -1,1 +1,1 @@
-"""What a run shows and leaves behind: progress, history, fields, figures."""
+"""Results of a run: progress, history, fields, figures."""

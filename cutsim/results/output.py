@@ -1,4 +1,4 @@
-"""What a run leaves behind in numbers: history rows, a summary, and fields for ParaView."""
+"""Output files of a run: history rows, a summary, and fields for ParaView."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ os.environ.setdefault("HOME", str(Path.home()))
 
 
 class _Closing:
-    """A context manager that closes itself at the end."""
+    """Base of context managers that close themselves at the end."""
 
     def close(self) -> None:
         """Close; a second call does nothing."""
@@ -50,7 +50,7 @@ class _Closing:
 
 
 class HistoryWriter(_Closing):
-    """A CSV table that grows by one row per accepted step.
+    """Writer of a CSV table with one row for each accepted step.
 
     Every row is flushed as it is written, so the file is complete and readable at any moment, also after a
     crash. Use it as a context manager; its methods are collective.
@@ -183,7 +183,7 @@ def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False,
 
 
 class FieldWriter(_Closing):
-    """Fields in VTX files (ADIOS2), which ParaView opens with its ADIOS2VTXReader. Collective.
+    """Writer of fields in VTX files (ADIOS2), which ParaView opens with its ADIOS2VTXReader. Collective.
 
     - ``displacement.bp`` holds u as it is solved for. Its points are the nodes of the space, so a crack opens
       when the grid is warped by u.
@@ -285,7 +285,7 @@ def _compiled(function: fem.Function, expression: Expr) -> fem.Expression:
 
 @dataclass(frozen=True)
 class _Derived:
-    """An expression, sampled where it is accurate and shown on the discontinuous linear space."""
+    """A derived field, sampled where it is accurate and output on the discontinuous linear space."""
 
     source: fem.Expression | fem.Function
     sample: fem.Function

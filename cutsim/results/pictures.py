@@ -1,4 +1,4 @@
-"""Pictures of a run: the deformed, cut body and the tool (pyvista, off screen).
+"""Pictures of a run: the deformed and cut body with the tool (pyvista, off screen).
 
 Pictures are extras: where pyvista is missing or cannot draw, that is logged as a warning and the run goes on.
 """

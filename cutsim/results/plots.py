@@ -1,4 +1,4 @@
-"""Curves of a run: force, energy audit (matplotlib). Call these functions on one rank."""
+"""Plots of a run: force and energy audit (matplotlib). Call these functions on one rank."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ENERGIES = {
 
 @dataclass(frozen=True)
 class Curve:
-    """One line of a plot.
+    """A curve of a plot.
 
     Args:
         x: Abscissae.

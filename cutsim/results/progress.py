@@ -1,4 +1,4 @@
-"""What a run shows while it works: a bar on a terminal, a plain line now and then elsewhere."""
+"""Progress of a run: a bar on a terminal, otherwise a plain line from time to time."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from cutsim.base.checks import require
 
 
 class Progress:
-    """Progress over the load parameter, from the first rank alone.
+    """Progress over the time of the run, shown by the first rank.
 
     A terminal gets a bar with the numbers of the current step and the time to go; a file or a CI log gets one
     plain line every few seconds and the last one. Use it as a context manager: the terminal is restored also

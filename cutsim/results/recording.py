@@ -1,4 +1,4 @@
-"""What a run leaves in a folder while it goes on: history, fields, progress."""
+"""Recording of a run in a folder: history, fields, progress."""
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
@@ -165,7 +165,7 @@ class Recording:
 
 
 class _CrackFields:
-    """Facet means of a crack as functions on its submesh."""
+    """Facet means of a crack, as functions on its submesh."""
 
     def __init__(self, crack: Crack) -> None:
         self.crack = crack
