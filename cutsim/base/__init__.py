@@ -1,1 +1,1 @@
-"""What all rests on: compiled forms, kinematics, checks, units, and what a term of the virtual work can do."""
+"""Foundations: compiled forms, kinematics, checks, units, and the terms of the virtual work."""

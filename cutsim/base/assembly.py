@@ -1,4 +1,4 @@
-"""Compiled forms to reduced numbers and owned arrays. Every function is collective."""
+"""Assembly of compiled forms to reduced numbers and owned arrays. Every function is collective."""
 
 import numpy as np
 from dolfinx import fem, la

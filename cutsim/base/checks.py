@@ -1,4 +1,4 @@
-"""One way to refuse bad input: the parameter, its value and what is allowed.
+"""Checks of input: an error names the parameter, its value and what is allowed.
 
 What is allowed of a number is an object that knows its own words, so that a number is compared only once it is known to
 be one: `require_number("young", young, positive)`.
@@ -37,7 +37,7 @@ def place(x: Iterable[float]) -> str:
 
 @dataclass(frozen=True)
 class Interval:
-    """Numbers that are allowed, finite ones unless the interval says otherwise.
+    """Interval of allowed numbers, which are finite unless the interval says otherwise.
 
     Args:
         words: What they are, in words that complete "a finite number …".

@@ -1,4 +1,4 @@
-"""What differs between the versions of dolfinx and PETSc that are supported: dolfinx 0.9, 0.10 and 0.11.
+"""Compatibility with the supported versions of dolfinx (0.9, 0.10 and 0.11) and their versions of PETSc.
 
 Nothing outside this module asks which version is installed.  Each function has the meaning of the newest version and
 is written for the older ones beside it.

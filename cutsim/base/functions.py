@@ -1,4 +1,4 @@
-"""Elementary functions of symbols and of numbers alike, so that a law is written once and serves form and audit."""
+"""Elementary functions of UFL expressions and of arrays, so that a law is written once for form and audit."""
 
 import math
 from typing import Any

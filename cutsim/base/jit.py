@@ -1,4 +1,4 @@
-"""Compiling the kernels of forms: the options of the C compiler, and the cache of what was compiled."""
+"""Just-in-time compilation of forms: the options of the C compiler, and the cache of compiled kernels."""
 
 import fcntl
 import hashlib

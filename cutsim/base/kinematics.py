@@ -1,4 +1,4 @@
-"""Kinematics of large deformation, in pure UFL: no mesh, no state.
+"""Kinematics of large deformation in pure UFL, without a mesh or a state.
 
 Bulk tensors are three-dimensional also for plane problems, so that every strain energy is written once.
 Interface vectors keep the geometric dimension of the mesh.

@@ -1,4 +1,4 @@
-"""Messages of what all ranks do together, said once."""
+"""Log messages about collective actions, printed by one rank."""
 
 import logging
 

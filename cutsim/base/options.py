@@ -1,4 +1,4 @@
-"""PETSc options under one prefix, so that those of one solver never reach another."""
+"""PETSc options under one prefix, so that the options of one solver never affect another."""
 
 import atexit
 from collections.abc import Mapping
@@ -10,7 +10,7 @@ from cutsim.base.checks import require
 
 
 class Options:
-    """Options of one prefix in PETSc's database, kept there until `clear` or the end of the program.
+    """Options with one prefix in PETSc's database, where they stay until `clear` or the end of the program.
 
     They stay for the lifetime of the solver because PETSc reads some of them late, when a preconditioner is built.
 

@@ -1,4 +1,4 @@
-"""Numbers of laws and loads as form constants, so that another value needs no other kernel."""
+"""Parameters of laws and loads as form constants, so that a new value needs no new kernel."""
 
 from collections.abc import Callable, Mapping
 from copy import copy
@@ -95,7 +95,7 @@ def _unchecked(law: Any, **parts: Any) -> Any:
 
 
 class Schedule:
-    """A form constant that is a function of time.
+    """Form constant that is a function of time.
 
     Args:
         mesh: Mesh of the forms.

@@ -1,4 +1,4 @@
-"""Arguments of another kind than their annotation are refused by name, before anything is done with them."""
+"""Type checks of arguments: one that does not fit its annotation is refused by name before anything is computed."""
 
 import inspect
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What a term of the virtual work can do.
+"""Terms of the virtual work, and what they contribute to a step.
 
 The object that owns a term writes it: its form, its moving constants, its history and its share of the energy audit.
 `cutsim.analysis.mechanics` only adds terms up.
@@ -26,7 +26,7 @@ ENTRIES = (
 
 @dataclass(frozen=True)
 class Multiplier:
-    """A further unknown of a term and the equation that it adds.
+    """Additional unknown of a term, and the equation that it adds.
 
     Attributes:
         value: The unknown. Scaled to a length, so that its equation is a force like those of the displacement.

@@ -1,4 +1,4 @@
-"""The units a run is reported in.
+"""Units in which a run is reported.
 
 The equations carry no units: any consistent set will do. `Units` names the set in use, so that file headers
 and axis labels say what a number means.

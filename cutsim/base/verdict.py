@@ -1,4 +1,4 @@
-"""Whether what was computed can be trusted, and what speaks against it."""
+"""Verdict on a result: whether it can be trusted, and the reasons against it."""
 
 from cutsim.base.log import collective_logger
 
@@ -9,7 +9,7 @@ CLOSURE = 0.02
 
 
 class Verdict:
-    """What speaks against a result, gathered while it comes about; without any reason it is trusted.
+    """Reasons against a result, collected during the run; a result without any is trusted.
 
     Whoever sees something wrong says so in words: this is warned of once, when it is first seen, and the worst case is
     kept.  Every rank has to say the same.

@@ -1,1 +1,1 @@
-"""Terms of the bodies: strain energy, inertia, loads, supports."""
+"""Bodies: strain energy, inertia, loads and supports."""

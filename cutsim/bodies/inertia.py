@@ -1,4 +1,4 @@
-"""Inertia of the solids: their mass, and velocity and acceleration along the steps (docs/dynamics.md).
+"""Inertia of the solids: mass, velocity and acceleration over the steps (docs/dynamics.md).
 
 The scheme's balance at the end of a step, divided by 1 − α_f, is solved in the form
 
@@ -33,7 +33,7 @@ Velocity = Callable[[NDArray[np.float64]], NDArray[np.float64]] | Sequence[float
 
 @dataclass(frozen=True)
 class _Books:
-    """Owned inertia forces M a and energies at the end of a step."""
+    """Inertia forces M a on owned dofs and energies at the end of a step."""
 
     forces: Array
     kinetic: float = 0.0

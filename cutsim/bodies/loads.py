@@ -1,4 +1,4 @@
-"""Supports and loads."""
+"""Supports, dead loads and pressure."""
 
 from abc import ABC, abstractmethod
 
@@ -84,7 +84,7 @@ class Support:
 
 
 class Load(Term, ABC):
-    """Load on a part of the boundary, `_density` per reference area; it follows one factor that varies in time."""
+    """Base of loads on a part of the boundary, `_density` per reference area times a factor that varies in time."""
 
     def __init__(
         self,
@@ -181,7 +181,7 @@ class Traction(Load):
 
 
 class Pressure(Load):
-    """Pressure of a fluid on a part of the boundary: it acts along the current normal, per current area.
+    """Fluid pressure on a part of the boundary, along the current normal and per current area.
 
     Nanson's formula gives the force −p cof(F) N per reference area; in plane stress the change of thickness is left
     out.

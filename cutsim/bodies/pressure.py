@@ -1,4 +1,4 @@
-"""Continuous pressure as a second unknown of a body: elements of Taylor and Hood (docs/elements.md §2).
+"""Taylor–Hood elements: a continuous pressure as a second unknown of a body (docs/elements.md §2).
 
 The volumetric part of every strain energy is U = ½ κ g², with g a measure of the change of volume. Its perturbed
 Lagrangian (Brink and Stein 1996)
@@ -31,7 +31,7 @@ MEASURES: tuple[Callable[[Expr], Expr], ...] = (
 
 
 class PressureField:
-    """Pressure of one body, continuous but for cracks.
+    """Pressure of one body, continuous except across cracks.
 
     Args:
         state: Displacement and time.

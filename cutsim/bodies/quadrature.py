@@ -1,4 +1,4 @@
-"""With how many points the two parts of a strain energy are integrated."""
+"""Quadrature degrees of the two parts of a strain energy."""
 
 import numpy as np
 import ufl

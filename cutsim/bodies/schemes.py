@@ -1,4 +1,4 @@
-"""Time integration schemes: four numbers that weigh accelerations and forces over a step (docs/dynamics.md).
+"""Time integration schemes, given by four numbers that weight accelerations and forces over a step (docs/dynamics.md).
 
 With u, v, a at the start (0) and the end (1) of a step of size Δt, the mass M and the static forces R, internal minus
 external:
@@ -16,7 +16,7 @@ from cutsim.base.signatures import checked
 
 @runtime_checkable
 class Scheme(Protocol):
-    """What a scheme must tell: the numbers of the equations above, all dimensionless."""
+    """Protocol of a scheme: the numbers of the equations above, all dimensionless."""
 
     @property
     def alpha_m(self) -> float:
@@ -75,7 +75,7 @@ TRAPEZOIDAL = Newmark()
 @checked
 @dataclass(frozen=True)
 class GeneralisedAlpha:
-    """Generalised-α scheme: second order, damps what the steps do not resolve and little else.
+    """Generalised-α scheme: of second order, with damping of the modes that the steps do not resolve.
 
     Chung, Hulbert, A time integration algorithm for structural dynamics with improved numerical dissipation: the
     generalized-α method, J. Appl. Mech. 60 (1993) 371–375, equations 17 and 25.

@@ -1,4 +1,4 @@
-"""Mixed elements for nearly incompressible bodies, the pressure eliminated cell by cell (docs/elements.md §2).
+"""Mixed elements for nearly incompressible bodies, with the pressure eliminated in each cell (docs/elements.md §2).
 
 In each cell the volume change J is projected on polynomials ψ: the constant for degree 1 of the displacement, also
 the linear ones for degree 2.  The volumetric energy is that of the projection J̄,
@@ -28,7 +28,7 @@ _CHUNK = 2000
 
 
 class VolumeChange:
-    """Projected volume change of one body, and its pressure.
+    """Projected volume change and pressure of one body.
 
     Args:
         state: Displacement and time.
@@ -108,7 +108,7 @@ class VolumeChange:
 
 
 class _Blocks:
-    """A bilinear form with a test function that is constant in the cells, as a dense block a cell.
+    """Bilinear form with a test function that is constant in the cells, as one dense block for each cell.
 
     Args:
         a: The form.

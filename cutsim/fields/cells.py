@@ -1,4 +1,4 @@
-"""Cells that are none: without volume, folded, or one over the other."""
+"""Checks of cells: without volume, folded, or overlapping."""
 
 import numpy as np
 from dolfinx.mesh import Mesh, compute_midpoints, entities_to_geometry

@@ -1,4 +1,4 @@
-"""Prescribed values taken together: a dof that several parts hold has one value and one reaction."""
+"""Dirichlet conditions of a problem: a dof that several parts prescribe has one value and one reaction."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -15,7 +15,7 @@ _SAME = 1e-9
 
 
 class Prescribed(Protocol):
-    """A value that is prescribed on some dofs.
+    """Value that is prescribed on some dofs.
 
     Attributes:
         name: Its name, or None.
@@ -33,7 +33,7 @@ class Prescribed(Protocol):
 
 
 class Constraints:
-    """The prescribed values of a problem, some of which may hold the same dofs.
+    """All prescribed values of a problem; several of them may share dofs.
 
     Args:
         V: The space.

@@ -1,4 +1,4 @@
-"""Whether the facets of a crack are a crack: opened in the space, and without a gap."""
+"""Checks of the facets of a crack: the space is cracked along them, and none is missing."""
 
 import numpy as np
 from dolfinx import fem

@@ -1,4 +1,4 @@
-"""What gmsh holds, as arrays, after a check that its groups make one mesh. Runs on one rank; no dolfinx mesh yet."""
+"""Arrays of a gmsh model, after a check that its groups make one mesh. Runs on one rank, before the dolfinx mesh."""
 
 import logging
 import math
@@ -38,7 +38,7 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class Model:
-    """A mesh with groups, numbered without gaps.
+    """Mesh with groups, numbered without gaps.
 
     Attributes:
         cell: Name of the cell.

@@ -1,4 +1,4 @@
-"""Mesh of a block of flat layers with a crack plane through all of them: structured, graded, with named regions."""
+"""Mesh of a block of flat layers with one crack plane: structured, graded, with named regions."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""Integration measures of one mesh, all drawing on the same lists of entities.
+"""Integration measures of one mesh, which all share the same subdomain data.
 
 dolfinx compiles a sum of terms only if they share their subdomain data.  A term asks for the entities it needs and
 gets a measure with a marker of its own; '+' is the first cell of an interior-facet row, on any number of ranks.
@@ -32,7 +32,7 @@ class _Revolved(ufl.Measure):
 
 
 class Measures:
-    """Hands out measures over cells, exterior facets and interior facets.
+    """Source of the measures over cells, exterior facets and interior facets.
 
     Args:
         mesh: The mesh; its facet–cell connectivity is created.

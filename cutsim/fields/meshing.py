@@ -1,4 +1,4 @@
-"""Meshes with named regions, read from gmsh or tagged by markers, and the element sizes the numerics need."""
+"""Meshes with named regions, read from gmsh or tagged by markers."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Group = tuple[int, int]
 @checked
 @dataclass(frozen=True)
 class TaggedMesh:
-    """A mesh and the names of its regions.
+    """Mesh with named groups of cells and facets.
 
     Attributes:
         mesh: The mesh; from the readers below always with shared-facet ghosts, without which a crack along

@@ -1,4 +1,4 @@
-"""Integration points on facets: history that lives there, expressions evaluated there, sums over them."""
+"""Integration points on facets: history variables, evaluation of expressions, and sums."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ Values = NDArray[np.float64]
 
 
 class FacetPoints:
-    """The integration points of a facet measure, and what is known there.
+    """Integration points of a facet measure, with their values and weights.
 
     Arrays of point values have the shape (local facets, points) or, for vectors, (local facets, points, components), in
     the order of `facets`; they are equal on owner and ghosts.
@@ -167,7 +167,7 @@ class FacetPoints:
 @checked
 @dataclass(frozen=True)
 class Surface:
-    """A surface that a tool can touch: its integration points and, for a crack, the side of it.
+    """Surface that a tool can touch: its integration points and, on a crack, its side.
 
     Args:
         points: Integration points.

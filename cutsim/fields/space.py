@@ -1,4 +1,4 @@
-"""The cracked function space: the only place that knows how the sides of a crack get their own dofs.
+"""Cracked function space: each side of a crack gets its own dofs, here and nowhere else.
 
 A crack is a set of interior facets of a conforming mesh. It is opened in the function space, not in the mesh:
 each dof on the crack is copied once for every part into which the crack divides the cells around it. So
@@ -278,7 +278,7 @@ def _along(mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], direction: NDA
 
 @dataclass(frozen=True)
 class _Incidence:
-    """Which cells meet in the dofs on the crack, on this rank. A key is one number for a (dof, cell) pair."""
+    """Cells that meet in the dofs on the crack, on this rank. A key is one number for a (dof, cell) pair."""
 
     cells: NDArray[np.int64]  # local cell of each node ...
     places: NDArray[np.int64]  # ... place of the dof in that cell ...
@@ -290,7 +290,7 @@ class _Incidence:
 
 @dataclass(frozen=True)
 class _Copies:
-    """The copies of the dofs on the crack, the same on all ranks."""
+    """Copies of the dofs on the crack, the same on all ranks."""
 
     keys: NDArray[np.int64]  # all (dof, cell) keys, sorted ...
     labels: NDArray[np.int64]  # ... and the copy that each belongs to

@@ -1,4 +1,4 @@
-"""What changes in a run: displacement and time, each with a trial and a committed value."""
+"""State of a run: displacement and time, trial and committed."""
 
 import numpy as np
 import ufl
@@ -16,7 +16,7 @@ from cutsim.fields.measures import Measures
 
 
 class State:
-    """Displacement, time and step size, trial and committed.
+    """State of a run: displacement, time and step size, trial and committed.
 
     Args:
         V: Vector space of the displacement, usually from `cutsim.fields.space.cracked_space`.

@@ -1,4 +1,4 @@
-"""The temperature: a scalar field, discontinuous across cracks, with a trial and a committed value."""
+"""Temperature: a scalar field, discontinuous across cracks, trial and committed."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ from cutsim.fields.state import State
 
 
 class Temperature:
-    """Temperature at the nodes of a scalar space.
+    """Temperature field on a scalar space, trial and committed.
 
     Args:
         state: Displacement and time of the same mesh.

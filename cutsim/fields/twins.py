@@ -1,4 +1,4 @@
-"""Nodes that lie on each other without being one: bodies that touch and were not merged, meshes that are split."""
+"""Coincident nodes that are not merged: bodies that only seem to be joined, and meshes that are split."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _SAME = 1e-7
 
 @dataclass(frozen=True)
 class Twins:
-    """Pairs of nodes of the outer boundary that lie on each other, the same on all ranks.
+    """Pairs of coincident nodes of the outer boundary, the same on all ranks.
 
     Attributes:
         nodes: Global numbers of the nodes of each pair, shape (pairs, 2).
