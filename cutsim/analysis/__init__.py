@@ -1,1 +1,1 @@
-"""The sum of the terms, the energy audit, and the loop over steps."""
+"""Analysis: mechanics and heat as sums of terms, the energy audit, and the loop over steps."""

@@ -1,4 +1,4 @@
-"""The energy audit: external work against what became of it (docs/theory.md §6)."""
+"""Energy audit: external work against stored and dissipated energy (docs/theory.md §6)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -8,7 +8,7 @@ from cutsim.base.terms import ENTRIES
 
 @dataclass(frozen=True)
 class EnergyAudit:
-    """Energies since the start of a run [energy].
+    """Energy audit since the start of a run [energy].
 
     External work is summed from reactions and loads (trapezoidal rule); stored energies are functions of the state;
     dissipated ones are summed from the tractions of the residual.  They are computed independently of each other, so

@@ -1,4 +1,4 @@
-"""The mechanical problem of one step: adds the terms up, derives the tangent, keeps the books of a trial step."""
+"""Mechanics of one step: the sum of the terms, the tangent, and the energy audit of a trial step."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -47,7 +47,7 @@ _prefixes = chain(["cut_"], (f"cut{n}_" for n in count(2)))
 
 
 class Mechanics:
-    """Equilibrium or motion of solids, cracks, tools and loads.
+    """Mechanical problem of solids, cracks, tools and loads, quasi-static or dynamic.
 
     Args:
         state: Displacement and time.

@@ -1,4 +1,4 @@
-"""Whether every piece of a body is held: motions as rigid bodies that nothing resists, and their names."""
+"""Check that every piece of a body is held: rigid motions that nothing resists, in words."""
 
 from collections.abc import Callable, Mapping
 

@@ -1,4 +1,4 @@
-"""One step of a body that deforms and conducts heat: mechanics at fixed temperature, heat at fixed shape."""
+"""Staggered step of mechanics and heat: mechanics at fixed temperature, then heat at fixed displacement."""
 
 from collections.abc import Mapping
 from dataclasses import replace

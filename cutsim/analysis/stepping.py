@@ -1,4 +1,4 @@
-"""The loop over steps: the only place that commits.
+"""Loop over steps, the only place that commits.
 
 One step: begin → move tools and loads → solve → (failure: roll back, another line search, then a smaller step) → trial
 history → accept or reject → commit, record.
@@ -33,7 +33,7 @@ _ROUNDING = 1e-6
 
 
 class Audit(Protocol):
-    """Books of a conserved quantity."""
+    """Protocol of an audit of a conserved quantity."""
 
     @property
     def scale(self) -> float:
@@ -49,7 +49,7 @@ class Audit(Protocol):
 
 
 class Problem(Protocol):
-    """What can be stepped: `cutsim.analysis.mechanics.Mechanics`, `HeatTransfer`, or both as `ThermoMechanics`.
+    """Protocol of what `run` can step: `Mechanics`, `HeatTransfer`, or both as `ThermoMechanics`.
 
     Attributes:
         state: Displacement and time.
@@ -115,13 +115,13 @@ class Problem(Protocol):
 
 
 class StepError(RuntimeError):
-    """No equilibrium was found with the smallest step allowed; what was recorded before stays readable."""
+    """Raised when no step of the smallest allowed size succeeds; the recorded history stays readable."""
 
 
 @checked
 @dataclass(frozen=True)
 class StepControl:
-    """How large steps are.
+    """Step control: sizes of the steps, and limits on them.
 
     Args:
         first: First step, and the first one after each corner of a path [time].
@@ -173,7 +173,7 @@ class StepControl:
 
 @dataclass
 class StepReport:
-    """One accepted step, for recorders.
+    """Report of an accepted step, for recorders.
 
     Attributes:
         number: Steps accepted so far.
@@ -195,7 +195,7 @@ class StepReport:
 
 
 class Interrupted(KeyboardInterrupt):
-    """A signal has ended a run after a step, on all ranks; what was recorded stays.
+    """Raised on all ranks when a signal has ended a run after a step; the recorded history stays readable.
 
     As for any Ctrl-C, ``except Exception`` lets it pass: a script does not go on as if the run were finished.
 

@@ -1,1 +1,1 @@
-"""Conduction, and heat made and exchanged where surfaces meet."""
+"""Heat: conduction in bodies, and heat that is generated and exchanged at contacts."""

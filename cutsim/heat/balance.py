@@ -1,4 +1,4 @@
-"""What a term of the heat balance can do, and the audit of heat (docs/theory.md §3.4)."""
+"""Terms of the heat balance, and the audit of heat (docs/theory.md §3.4)."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -12,7 +12,7 @@ SPENT = ("stored", "outflow")
 
 
 class HeatTerm(Term):
-    """A term of the heat balance: `residual` is tested with a temperature, and is heat going in minus coming out.
+    """Term of the heat balance; `residual` is tested with a temperature and is heat going in minus coming out.
 
     Args:
         temperature: The temperature.
@@ -29,7 +29,7 @@ class HeatTerm(Term):
 
 @dataclass(frozen=True)
 class HeatBalance:
-    """Heat since the start of a run [energy].
+    """Audit of heat since the start of a run [energy].
 
     Attributes:
         entries: Heat from friction, fracture and sources, heat that has come in through boundaries and tools; heat

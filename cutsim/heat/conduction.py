@@ -1,4 +1,4 @@
-"""A body that stores and conducts heat (docs/theory.md §3.4)."""
+"""Heat capacity and conduction of a body (docs/theory.md §3.4)."""
 
 import numpy as np
 import ufl

@@ -14,7 +14,7 @@ from cutsim.fields.points import Values
 
 
 class HeatLaw(Protocol):
-    """What the exchange of heat needs of a law."""
+    """Protocol of a law of heat exchange."""
 
     @property
     def capacity(self) -> float:
@@ -102,7 +102,7 @@ class ContactHeat:
 @checked
 @dataclass(frozen=True)
 class AdiabaticTool:
-    """A tool that exchanges no heat with the body but takes its part of the friction.
+    """Tool that exchanges no heat with the body but takes its share of the friction heat.
 
     Args:
         share: Fraction of the friction dissipation that flows into the body, in [0, 1] [–].

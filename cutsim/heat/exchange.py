@@ -20,7 +20,7 @@ _ROUNDING = 1e-9
 
 
 class HeatExchange:
-    """Exchange of heat between two surfaces, '+' and '−', and the interface between them.
+    """Heat exchange between two surfaces, '+' and '−', and the interface between them.
 
     Args:
         temperature: The temperature.

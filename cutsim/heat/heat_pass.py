@@ -1,4 +1,4 @@
-"""Heat between the points of one surface and their partners on another (docs/theory.md §3.4, §3.5)."""
+"""Heat exchange between slave points and their partners on a master surface (docs/theory.md §3.4, §3.5)."""
 
 import basix
 import numpy as np
@@ -17,7 +17,7 @@ from cutsim.pairs.surface_pass import SurfacePass
 
 
 class HeatPass:
-    """Exchange of heat at the points of a slave surface. Every method is collective.
+    """Heat exchange at the points of a slave surface. Every method is collective.
 
     The flux q⁺ leaves the slave at its points and q⁻ the master where the points meet it.  Both follow from the two
     temperatures by the law of a crack: these are functions of the points, which are found beforehand.  A point without

@@ -20,14 +20,14 @@ from cutsim.interface.crack import Crack
 
 
 class Friction(Protocol):
-    """What heat needs of friction on a crack."""
+    """Protocol of friction on a crack, as heat uses it."""
 
     def dissipation(self) -> Values:
         """Friction dissipation of the trial step per reference area at the crack's points [energy/area]."""
 
 
 class InterfaceHeat(HeatTerm):
-    """Heat exchange across a crack, with the dissipation of friction and fracture as its source.
+    """Heat exchange across a crack, heated by friction and fracture.
 
     Pressure and dissipation are those of the mechanical step, per reference area.
 

@@ -1,4 +1,4 @@
-"""Heat through the boundary: given flux, convection, given temperature. All areas are those of the reference."""
+"""Thermal boundary conditions: flux, convection, temperature. All areas are those of the reference configuration."""
 
 from abc import ABC, abstractmethod
 
@@ -19,7 +19,7 @@ from cutsim.heat.balance import HeatTerm
 
 
 class _SurfaceHeat(HeatTerm, ABC):
-    """Heat through a part of the boundary, `_influx` per reference area; it follows one number that varies in time."""
+    """Base of heat through the boundary, `_influx` per reference area; one number of it varies in time."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class _SurfaceHeat(HeatTerm, ABC):
 
 
 class HeatFlux(_SurfaceHeat):
-    """Given heat flux on a part of the boundary.
+    """Prescribed heat flux on a part of the boundary.
 
     Args:
         temperature: The temperature.
@@ -146,7 +146,7 @@ class Convection(_SurfaceHeat):
 
 
 class PrescribedTemperature:
-    """Given temperature on some facets (or vertices, or cells), with the heat flow it takes.
+    """Prescribed temperature on some facets (or vertices, or cells), with its heat flow.
 
     On a crack it holds all its sides. Several may hold the same node if they agree on its temperature at all times; its
     heat flow then counts for the first of them that has a name.

@@ -1,4 +1,4 @@
-"""Heat between two surfaces that find each other and slide far (docs/theory.md §3.4, §3.5)."""
+"""Heat between two surfaces with large sliding (docs/theory.md §3.4, §3.5)."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from cutsim.pairs.surface_pair import SurfacePair
 
 
 class PairHeat(AssembledTerm[HeatPass], HeatTerm):
-    """Heat exchange across a pair of surfaces, with the dissipation of their friction and bond as its source.
+    """Heat exchange across a pair of surfaces, heated by their friction and fracture.
 
     Pressure, partners and dissipation are those of the mechanical step, per reference area of the slave.  The interface
     and its temperature move with the slave.  In two passes each surface is slave once, with its share of the area.

@@ -1,4 +1,4 @@
-"""Heat between a rigid tool and the body it touches (docs/theory.md §3.4)."""
+"""Heat between a rigid tool and the body that it touches (docs/theory.md §3.4)."""
 
 import numpy as np
 import ufl
@@ -16,7 +16,7 @@ from cutsim.tools.tool_contact import ToolContact
 
 
 class ToolHeat(HeatTerm):
-    """Heat exchange with a rigid tool, with the dissipation of its friction as source.
+    """Heat exchange with a rigid tool, heated by its friction.
 
     Args:
         temperature: The temperature of the body.

@@ -1,4 +1,4 @@
-"""The heat problem of one step: adds the terms up, solves for the temperature, keeps the audit of heat."""
+"""Heat transfer in one step: the sum of the terms, the solution for the temperature, and the audit of heat."""
 
 from collections.abc import Mapping, Sequence
 from itertools import chain, count

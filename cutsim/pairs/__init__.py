@@ -1,1 +1,1 @@
-"""Two outer surfaces, meshed apart, that find each other under the law of an interface."""
+"""Pairs of outer surfaces with different meshes that find each other, under the law of an interface."""

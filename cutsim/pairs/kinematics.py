@@ -1,4 +1,4 @@
-"""Partners of the points of a surface on another one, opening and slide between them (docs/theory.md §3.5)."""
+"""Kinematics of a pair: partners of the slave points, opening and slide (docs/theory.md §3.5)."""
 
 import basix
 import numpy as np
@@ -24,7 +24,7 @@ WILD = 1e9
 
 
 class PairKinematics:
-    """The points of a slave surface and their partners on a master surface. Every method is collective.
+    """Slave points and their partners on a master surface. Every method is collective.
 
     Sliding pairs: a point's partner is where the ray along ν meets the current master surface, and the opening is the
     distance along the ray.  The slide grows by −a_α·(x_m − x_s) at the *start* of the step, between the point and the

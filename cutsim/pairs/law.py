@@ -1,4 +1,4 @@
-"""The interface law at points whose jump is found by other means than a form (docs/theory.md §3, 3.5)."""
+"""Interface law at points whose jump is not computed by a form (docs/theory.md §3, 3.5)."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ from cutsim.pairs.points import Pairs
 
 @dataclass(frozen=True)
 class PairLaws:
-    """The laws of a pair of surfaces, which are those of a crack.
+    """Laws of a pair of surfaces; they are those of a crack.
 
     Args:
         cohesive: Cohesive law, None for a broken interface.
@@ -39,7 +39,7 @@ class PairLaws:
 
 
 class PairLaw:
-    """Tractions and their derivatives for a jump that is a function of the points. Every method is collective.
+    """Tractions at the points and their derivatives by the jump. Every method is collective.
 
     Args:
         state: Displacement and time.

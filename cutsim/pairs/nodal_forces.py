@@ -1,4 +1,4 @@
-"""Tractions between two surfaces brought to the nodes of both, and the tangent thereof (docs/theory.md §3.5)."""
+"""Nodal forces from the tractions between two surfaces, and their tangent (docs/theory.md §3.5)."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from cutsim.pairs.points import Pairs
 
 @dataclass(frozen=True)
 class Tractions:
-    """Tractions at all points of a slave surface, in the components of the jump.
+    """Tractions at the points of a slave surface, in the components of the jump.
 
     Attributes:
         values: On the slave, shape (points, dimension) [stress].

@@ -1,4 +1,4 @@
-"""The nodes of facets on the outer boundary: on the ranks that have them, or gathered on every rank."""
+"""Facets on the outer boundary and their nodes, distributed or gathered on every rank."""
 
 from typing import Protocol
 
@@ -68,7 +68,7 @@ class OuterSurface:
 
 
 class Master(Protocol):
-    """A surface that points find, of which every rank knows all facets. Every method is collective.
+    """Protocol of a master surface, of which every rank knows all facets. Every method is collective.
 
     Attributes:
         shape, sides, reference: As of `OuterSurface`, for the facets of all ranks.
@@ -91,7 +91,7 @@ class Master(Protocol):
 
 
 class SharedSurface:
-    """An outer surface of which every rank knows all facets. Every method is collective.
+    """Outer surface of a body as a master, gathered on every rank. Every method is collective.
 
     Args:
         surface: The facets of this rank.

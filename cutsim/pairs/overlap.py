@@ -1,4 +1,4 @@
-"""Points of a surface that are within another body from the start (docs/theory.md §3.5)."""
+"""Initial overlap: points of a surface that are inside another body from the start (docs/theory.md §3.5)."""
 
 import numpy as np
 from dolfinx import geometry

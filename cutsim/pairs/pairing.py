@@ -1,4 +1,4 @@
-"""Two surfaces that find each other: search, and projection along rays (docs/theory.md §3.5). No mesh, no state.
+"""Search of partners and projection along rays (docs/theory.md §3.5), without a mesh or a state.
 
 A ray from a point x of the slave surface along its unit normal ν meets the master surface at x + g ν.  Positions are
 in the current configuration; an array of facets has the shape (facets, nodes, dimension).
@@ -22,7 +22,7 @@ _ITERATIONS, _ACCURACY, _OUTSIDE = 20, 1e-14, 1.0
 
 @dataclass(frozen=True)
 class Shape:
-    """Reference shape of all facets of a surface.
+    """Reference facet that all facets of a surface share.
 
     Args:
         element: Lagrange element on the reference facet.
@@ -51,7 +51,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Hits:
-    """Where the rays of some points meet the master surface.
+    """Hits of the rays of some points on the master surface.
 
     Attributes:
         points: The points that have a partner, ascending.

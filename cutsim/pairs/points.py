@@ -1,4 +1,4 @@
-"""Points of a slave surface, their partners, and derivatives of opening and slide (docs/theory.md §3.5).
+"""Slave points, their partners, and derivatives of opening and slide (docs/theory.md §3.5).
 
 The jump at a slave point has components in a frame (ν, a₁, a₂) that turns with the slave surface: ν is its outward
 normal, a₁ follows the first reference direction of the facet.  Everything depends on the nodes through four vectors
@@ -16,7 +16,7 @@ from cutsim.pairs.pairing import Array, Hits, Indices, inverse
 
 @dataclass(frozen=True)
 class Points:
-    """Points on the slave surface in a configuration, flattened over its facets.
+    """Slave points in a configuration, flattened over the facets.
 
     Attributes:
         x: Positions, shape (points, dimension) [length].
@@ -66,7 +66,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Pairs:
-    """Points and their partners in a configuration.
+    """Slave points and their partners in a configuration.
 
     Attributes:
         slave: The slave points.

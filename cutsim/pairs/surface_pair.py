@@ -1,4 +1,4 @@
-"""Two outer surfaces, meshed apart, that find each other and slide far (docs/theory.md §3.5; thesis 4.28–4.57)."""
+"""Large sliding between two outer surfaces with different meshes (docs/theory.md §3.5; thesis 4.28–4.57)."""
 
 import numpy as np
 from numpy.typing import NDArray

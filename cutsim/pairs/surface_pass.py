@@ -1,4 +1,4 @@
-"""One surface against another: jump, law and forces of a step (docs/theory.md §3.5)."""
+"""Pass of a slave surface over a master surface: jump, law and forces of a step (docs/theory.md §3.5)."""
 
 import numpy as np
 import ufl
@@ -34,7 +34,7 @@ def slave_points(state: State, facets: NDArray[np.int32], measure: ufl.Measure) 
 
 
 class SurfacePass:
-    """The points of a slave surface against a master surface. Every method is collective.
+    """Pass of a slave surface over a master surface. Every method is collective.
 
     The traction T acts on the slave, −T on the master.  Its components follow from the jump by the laws of a crack: the
     jump is a function of the points, which is found beforehand.

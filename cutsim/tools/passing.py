@@ -1,4 +1,4 @@
-"""Whether a rigid tool has come through the surface of the body to its inner side, where it would push outwards."""
+"""Check whether a rigid tool has passed through the surface of the body, where it would push outwards."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -18,7 +18,7 @@ _SAMPLES = 50
 
 
 class Touched(Protocol):
-    """A surface of the body that a tool may touch.
+    """Surface of the body that a tool may touch.
 
     Attributes:
         surface: Its points.
@@ -31,7 +31,7 @@ class Touched(Protocol):
 
 
 class Passing:
-    """Watches on which side of the surfaces a tool is. Every method is collective.
+    """Check on which side of the surfaces a tool is. Every method is collective.
 
     Args:
         tool: The tool, at the start of its path.

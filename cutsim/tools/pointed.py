@@ -1,4 +1,4 @@
-"""Pointed tools with a shank, blade and needle, whole or in halves (docs/theory.md §4)."""
+"""Blade and needle, whole or in halves (docs/theory.md §4)."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ def _pointed(across: Expr, above: Expr, half_angle: float, width: float, radius:
 
 
 class Pointed(ABC):
-    """What blade and needle have in common: a rounded tip, flanks at a half angle, a shank.
+    """Base of blade and needle: a rounded tip, flanks at a half angle, and a shank.
 
     Attributes:
         half_angle: Angle between axis and flank [rad].
@@ -118,7 +118,7 @@ class Pointed(ABC):
 @checked
 @dataclass(frozen=True)
 class Blade(Pointed):
-    """Wedge blade: rounded tip, flank at the half angle, parallel shank; its edge extends without end.
+    """Wedge blade with a rounded tip, flanks at the half angle and a parallel shank; its edge has no ends.
 
     With `side` = ±1 it is the *convex half blade* that one crack face meets: the half on the side of ±lateral,
     continued without end to the other side, so that no face is ever pushed to the wrong side.
@@ -158,7 +158,7 @@ class Blade(Pointed):
 @checked
 @dataclass(frozen=True)
 class Needle(Pointed):
-    """Round needle: cone with a rounded tip, cylindrical shaft; for 3-D and bodies of revolution.
+    """Round needle with a rounded conical tip and a cylindrical shaft, for 3-D and bodies of revolution.
 
     In a plane problem it is a wedge blade.  With `side` = ±1 it is the *convex half needle* that one face of a planar
     crack meets: the half on the side of ±lateral, continued without end to the other side.

@@ -1,4 +1,4 @@
-"""What all rigid tools have in common: a path, a force and a moment, the work on the body (docs/theory.md §4)."""
+"""Base of rigid tools: path, force and moment, and work on the body (docs/theory.md §4)."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ _Action = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class RigidTool(Term, ABC):
-    """A rigid tool whose reference point follows a path without turning.
+    """Rigid tool whose reference point follows a path without rotation.
 
     Args:
         state: Displacement and time.

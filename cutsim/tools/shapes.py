@@ -1,4 +1,4 @@
-"""Rigid tools: smooth signed distances and prescribed paths (docs/theory.md §4).
+"""Shapes of rigid tools as smooth signed distances, and prescribed paths (docs/theory.md §4).
 
 A shape is a frozen dataclass with one method, `distance(x)`, for a position relative to the tool's reference point:
 negative inside, |∇d| = 1.  Rounded shapes are the set of points within the tip radius of a sharp core, so that a
@@ -23,7 +23,7 @@ Direction = tuple[float, ...]
 
 @runtime_checkable
 class Shape(Protocol):
-    """What tool contact needs of a shape; see docs/adding_a_tool.md."""
+    """Protocol of a tool's shape; see docs/adding_a_tool.md."""
 
     @property
     def resolution(self) -> float:
@@ -72,7 +72,7 @@ def from_axis(x: Expr, push: Direction, scale: float) -> Expr:
 @checked
 @dataclass(frozen=True)
 class Ball:
-    """Sphere in 3-D, cylinder (or wire) in 2-D or, with an axis, in 3-D; the reference point is the centre.
+    """Sphere in 3-D; cylinder (or wire) in 2-D and, with an axis, in 3-D. The reference point is the centre.
 
     Args:
         radius: Radius > 0 [length].
@@ -104,7 +104,7 @@ class Ball:
 @checked
 @dataclass(frozen=True)
 class FlatPunch:
-    """Flat-ended punch, circular in 3-D and a strip in 2-D, with a rounded edge; reference point on the face.
+    """Flat-ended punch with a rounded edge, circular in 3-D and a strip in 2-D. The reference point is on the face.
 
     Args:
         radius: Radius (half width in 2-D) > edge_radius [length].

@@ -1,4 +1,4 @@
-"""A rigid tool in the body: contact on outer surfaces and crack faces, friction, reactions (docs/theory.md §4)."""
+"""Contact of a rigid tool with outer surfaces and crack faces, with friction and reactions (docs/theory.md §4)."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -26,7 +26,7 @@ from cutsim.tools.shapes import Path, Shape, check_directions
 
 
 class Patch:
-    """A rigid tool on one surface: gap, pressure, friction.
+    """Contact of a rigid tool with one surface: gap, pressure, friction.
 
     Args:
         state: Displacement and time.

@@ -1,4 +1,4 @@
-"""Books of a pointed tool by its parts, tip and shaft: force along it, friction work (docs/needle_insertion.md)."""
+"""Force and friction work of a pointed tool, divided into tip and shaft (docs/needle_insertion.md)."""
 
 from collections.abc import Callable, Sequence
 
@@ -19,7 +19,7 @@ _Books = dict[tuple[str, str], float]
 
 
 class ToolParts(Term):
-    """What tip and shaft contribute to the force along a tool and to its friction work; adds nothing to the balance.
+    """Force and friction work of tip and shaft of a tool; adds nothing to the balance.
 
     A point of the body counts to the part beside which it is now; the shaft begins at `Pointed.shaft_height`.  The
     parts sum up to the tool's force and friction work, as they come from the same tractions at the same points.

@@ -1,4 +1,4 @@
-"""A rigid tool whose surface is made of triangles, or of segments in 2-D (docs/theory.md §3.5, §4)."""
+"""Rigid tool whose surface consists of triangles, or of segments in 2-D (docs/theory.md §3.5, §4)."""
 
 from collections.abc import Sequence
 
@@ -29,7 +29,7 @@ from cutsim.tools.triangulation import Triangulation
 
 
 class RigidSurface:
-    """A triangulation that moves with a tool, as `cutsim.pairs.outer_surface.Master`.
+    """Triangulation that moves with a tool, as a master surface (`cutsim.pairs.outer_surface.Master`).
 
     Args:
         triangulation: The surface, relative to the reference point.

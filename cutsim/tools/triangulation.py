@@ -1,4 +1,4 @@
-"""Closed surfaces of triangles or segments, from files or arrays: the shape of a real tool (docs/theory.md §4)."""
+"""Triangulations of real tools: closed surfaces of triangles or segments, from files or arrays (docs/theory.md §4)."""
 
 import contextlib
 import io
