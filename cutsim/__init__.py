@@ -35,6 +35,7 @@ from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock
 from cutsim.tools.pointed import Blade, Needle
@@ -105,6 +106,7 @@ __all__ = [
     "Temperature",
     "ThermoElastic",
     "ThermoMechanics",
+    "Tolerances",
     "ToolContact",
     "ToolHeat",
     "ToolParts",

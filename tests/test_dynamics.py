@@ -23,6 +23,7 @@ from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import LinearElastic, NeoHookean
+from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
 
@@ -314,7 +315,7 @@ def test_block_bounces_off_a_rigid_plane():
     speed, gap, dt = 0.05, 0.01, 0.0025
     state, _, plane = block_on_plane(8, -gap, PenaltyContact(100.0))
     solid = Solid(state, LinearElastic(E, 0.0), density=RHO)
-    mechanics = Mechanics(state, [solid, plane], analysis="dynamic", rtol=1e-11)
+    mechanics = Mechanics(state, [solid, plane], analysis="dynamic", tolerances=Tolerances(rtol=1e-11))
     mechanics.inertia.set_velocity((0.0, -speed))
     momenta, forces, closures = [-RHO * speed], [0.0], []
     for _ in range(round((gap / speed + 2 / np.sqrt(E / RHO) + 0.2) / dt)):
@@ -335,7 +336,9 @@ def test_friction_brakes_a_sliding_block():
     state, top, plane = block_on_plane(2, p / contact.stiffness, contact, Coulomb(mu))  # as deep as p needs
     load = Traction(state, top, (0.0, -p), lambda t: 1.0)
     terms = [Solid(state, NeoHookean(1e3, 0.0), density=RHO), load, plane]
-    mechanics = Mechanics(state, terms, analysis="dynamic", scheme=GeneralisedAlpha(0.5), rtol=1e-10)
+    mechanics = Mechanics(
+        state, terms, analysis="dynamic", scheme=GeneralisedAlpha(0.5), tolerances=Tolerances(rtol=1e-10)
+    )
     mechanics.inertia.set_velocity((speed, 0.0))
     for i in range(1, 51):
         step(mechanics, dt)

@@ -31,6 +31,7 @@ from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean
 from cutsim.materials.rubbers import MooneyRivlin
 from cutsim.materials.viscoelastic import Prony
+from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.fracture import JIntegral
 from cutsim.tools.pointed import Needle
 from cutsim.tools.shapes import Ball, Path
@@ -110,7 +111,7 @@ def test_patch_of_a_stretched_cylinder(cell, degree):
     x[:, 1] += 0.1 * np.sin(np.pi * x[:, 1] / 2) * np.cos(2 * x[:, 0])
     b, material = Body(domain, degree), NeoHookean(E, 0.3)
     supports = [b.hold(at(0, 0), 0), b.hold(at(1, 0), 1), b.hold(at(1, 2), 1, lambda t: t, "pull")]
-    last = final(Mechanics(b.state, [Solid(b.state, material)], supports, rtol=1e-12))
+    last = final(Mechanics(b.state, [Solid(b.state, material)], supports, tolerances=Tolerances(rtol=1e-12)))
     stress, lateral = uniaxial_stress(material, 1.5)
     assert last["pull_force"] == pytest.approx(np.pi * 1.5**2 * stress, rel=1e-9)
     np.testing.assert_allclose(b.at(1.5, 2), [1.5 * (lateral - 1), 1.0], rtol=1e-9)
@@ -197,7 +198,7 @@ def test_cylinder_is_the_three_dimensional_body(rheology):
         top = mesh.locate_entities_boundary(state.mesh, dim - 1, at(dim - 1, 1.0))
         supports = [Support(state, face, i) for i, face in enumerate(faces)]
         supports.append(Support(state, top, dim - 1, lambda t: 0.4 * t, name="pull"))
-        m = Mechanics(state, [Solid(state, NeoHookean(E, 0.3), **options)], supports, rtol=1e-12)
+        m = Mechanics(state, [Solid(state, NeoHookean(E, 0.3), **options)], supports, tolerances=Tolerances(rtol=1e-12))
         rows.append(final(m, step=0.5))
     for name in ("pull_force", "energy_strain", "energy_viscous", "work_external"):
         assert rows[1][name] == pytest.approx(np.pi * rows[0][name], rel=1e-8, abs=1e-12)
@@ -252,7 +253,10 @@ def test_ball_pressed_into_a_cylinder_balances_the_support():
         contact = PenaltyContact(60.0, 0.05)
         ball = ToolContact(b.state, Ball(0.5), path, [surface], contact=contact, friction=Coulomb(0.3), name="ball")
         supports = [b.hold(at(0, 0), 0), b.hold(at(1, 0), 1, name="plate")]
-        last = final(Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), ball], supports, rtol=1e-11), step=step)
+        last = final(
+            Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), ball], supports, tolerances=Tolerances(rtol=1e-11)),
+            step=step,
+        )
         assert last["ball_force_y"] == pytest.approx(last["plate_force"], rel=1e-8)
         assert last["ball_force_y"] > 0.05
         errors.append(abs(last["energy_closure"]))
@@ -297,7 +301,7 @@ def test_cylinders_pressed_together_across_meshes_that_do_not_match():
     axis = mesh.locate_entities_boundary(s.state.mesh, 1, at(0, 0.0))
     supports = [Support(s.state, axis, 0), *s.drive(0, 0, (None, 0.0))]
     supports += s.drive(1, 1, (None, lambda t: -0.2 * t), name="press")
-    last = final(Mechanics(s.state, [Solid(s.state, material), pair], supports, rtol=1e-11))
+    last = final(Mechanics(s.state, [Solid(s.state, material), pair], supports, tolerances=Tolerances(rtol=1e-11)))
     assert pair.force()[1] == pytest.approx(-last["press_y_force"], rel=1e-8)
     assert last["press_y_force"] == pytest.approx(np.pi * uniaxial_stress(material, 0.9)[0], rel=5e-3)
     assert last["pair_pressed"] == pytest.approx(np.pi)
@@ -513,7 +517,9 @@ def test_mixed_halves_of_a_crack_are_torn_like_others():
         supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: 0.4 * t, name="pull"))
         solid = b.solid(NeoHookean(20.0, 0.4), volumetric=volumetric)
         crack = b.crack(EXPONENTIAL, young=20.0)
-        rows[volumetric] = final(Mechanics(b.state, [solid, crack], supports, rtol=1e-11), step=0.05)
+        rows[volumetric] = final(
+            Mechanics(b.state, [solid, crack], supports, tolerances=Tolerances(rtol=1e-11)), step=0.05
+        )
     assert rows["mixed"]["energy_fracture"] > 0.1
     for name in ("pull_force", "energy_strain", "energy_fracture"):
         assert rows["mixed"][name] == pytest.approx(rows["full"][name], rel=1e-6)

@@ -15,6 +15,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb, SmoothCoulomb
 from cutsim.materials.elastic import LinearElastic
+from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
 
@@ -167,7 +168,9 @@ def test_augmentation_sticks_within_tolerance():
     supports = b.drive(b.lower, [0.0, 0.0], "base")
     supports += [Support(b.state, top, 1, lambda t: -DEPTH * min(t, 1.0))]
     supports += [Support(b.state, top, 0, lambda t: 0.01 * max(t - 1, 0.0), name="top_x")]
-    mechanics = Mechanics(b.state, [b.solid(LinearElastic(E, 0.0)), crack, friction], supports, rtol=1e-11)
+    mechanics = Mechanics(
+        b.state, [b.solid(LinearElastic(E, 0.0)), crack, friction], supports, tolerances=Tolerances(rtol=1e-11)
+    )
     slides = []
 
     def watch(report):
@@ -266,7 +269,7 @@ def elastic_blocks(stick=None, comm=MPI.COMM_WORLD, gdim=2):
     supports += [
         Support(b.state, top, i, lambda t, far=far: far * t, name=f"top_{'xyz'[i]}") for i, far in enumerate(drag)
     ]
-    return Mechanics(b.state, [b.solid(), crack, friction], supports, rtol=1e-11), friction
+    return Mechanics(b.state, [b.solid(), crack, friction], supports, tolerances=Tolerances(rtol=1e-11)), friction
 
 
 @pytest.mark.parametrize("stick", [None, 1e-5], ids=["penalty", "augmented"])

@@ -31,6 +31,7 @@ from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.results.output import read_history
 from cutsim.results.recording import Recording
+from cutsim.solvers.convergence import Tolerances
 
 G, LAME = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)
 ALPHA, RISE = 1e-3, 100.0
@@ -52,7 +53,7 @@ class HotCube:
         )
         rest = [Support(self.state, self.face(i, 0.0), i, name=f"rest_{i}") for i in range(gdim)]
         held = [Support(self.state, self.face(i, at), j, value, name=name) for i, at, j, value, name in supports]
-        mechanics = Mechanics(self.state, [self.solid], [*rest, *held], rtol=1e-11)
+        mechanics = Mechanics(self.state, [self.solid], [*rest, *held], tolerances=Tolerances(rtol=1e-11))
         cells = np.arange(domain.topology.index_map(gdim).size_local, dtype=np.int32)
         warm = PrescribedTemperature(self.T, cells, lambda t: 300 + rise * t, dim=gdim)
         heat = HeatTransfer(self.T, [HeatBody(self.T, capacity=1.0, conductivity=1.0, body=self.solid)], [warm])
@@ -172,7 +173,7 @@ def clamped_pair(iterate, conductance=50.0):
     crack = b.crack(None, contact=PenaltyContact(200.0), normal="reference")
     walls = [Support(b.state, b.face(1, at), 1) for at in (0.0, 1.0)]
     sides = [Support(b.state, np.concatenate([b.face(0, 0.0), b.face(0, 1.0)]), 0)]
-    mechanics = Mechanics(b.state, [solid, crack], walls + sides, rtol=1e-11)
+    mechanics = Mechanics(b.state, [solid, crack], walls + sides, tolerances=Tolerances(rtol=1e-11))
     body = HeatBody(T, capacity=1.0, conductivity=1.0, body=solid)
     contact = InterfaceHeat(T, crack, ContactHeat(2 * conductance, 2 * conductance))
     held = [

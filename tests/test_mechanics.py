@@ -24,6 +24,7 @@ from cutsim.interface.crack import Crack
 from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.results.recording import Recording
+from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
 
@@ -62,7 +63,7 @@ DIRECT = {"ksp_type": "preonly", "pc_type": "lu"}
 
 def test_newton_converges_quadratically():
     """In every step, with large strain, softening, contact and regularised friction."""
-    mechanics = pried_and_pressed(petsc_options=DIRECT, rtol=1e-14)
+    mechanics = pried_and_pressed(petsc_options=DIRECT, tolerances=Tolerances(rtol=1e-14))
     for time in np.linspace(0.1, 1.0, 10):
         mechanics.begin(time)
         outcome = mechanics.solve("basic")
@@ -78,9 +79,10 @@ def test_newton_converges_quadratically():
 # -- the thesis' two boxes --------------------------------------------------------------------------------------------
 
 # what the program of the thesis prints: force on the upper box in ten steps (its law adds up to four times the strength
-# given); residuals of a typical step over the first (Table 4.7)
+# given); residuals and energies of a typical step over the first (Table 4.7)
 PRINTED = (3.226586, 3.996533, 3.710729, 3.061781, 2.368172, 1.758357, 1.269299, 0.897571, 0.624798, 0.429556)
 TABLE = np.array([1.702439, 1.246976, 7.549132e-5, 6.568224e-9, 6.594945e-16]) / 1.702439
+ENERGIES = np.array([1.417000e-7, 4.278462e-9, 3.689671e-13, 4.218806e-17]) / 7.086406e-7
 
 
 def two_boxes():
@@ -100,11 +102,11 @@ def two_boxes():
     solid = b.solid(LinearElastic(5e6, 0.48), volumetric="full")
     crack = b.crack(law, young=5e6, normal="reference")
     supports += b.drive(upper, [0.0, 0.0, lambda t: 4.8e-4 * t], "top")
-    return Mechanics(b.state, [solid, crack], supports, petsc_options=DIRECT, rtol=1e-14)
+    return Mechanics(b.state, [solid, crack], supports, petsc_options=DIRECT, tolerances=Tolerances(rtol=1e-14))
 
 
 def test_two_boxes_of_the_thesis():
-    """The forces of its own program to six figures, and residuals that fall at least as fast as those it prints."""
+    """The forces of its own program to six figures, residuals and energies that fall at least as fast as it prints."""
     mechanics, forces = two_boxes(), []
     for time in np.linspace(0.1, 1.0, 10):
         mechanics.begin(time)
@@ -114,6 +116,8 @@ def test_two_boxes_of_the_thesis():
         r = np.array(outcome.residuals)
         assert len(r) <= len(TABLE)
         assert np.all(r[2:] / r.max() <= TABLE[2 : len(r)]), outcome.residuals
+        energies = np.array([row.current.energy / row.initial.energy for row in outcome.history])
+        assert np.all(energies[1:] <= ENERGIES[1 : len(energies)]), energies
         forces.append(mechanics.record()["top_z_force"][0])
     np.testing.assert_allclose(forces, PRINTED, rtol=2e-6)
 
@@ -164,6 +168,7 @@ def test_contact_that_does_not_settle_is_refused():
     outcome = mechanics.solve()
     assert not outcome.converged
     assert "augmentations" in outcome.message
+    assert len(outcome.history) == outcome.iterations > 30, "those of all augmentations"
 
 
 # -- ranks ------------------------------------------------------------------------------------------------------------
@@ -174,8 +179,12 @@ def test_contact_that_does_not_settle_is_refused():
 def test_history_does_not_depend_on_the_number_of_ranks(gdim):
     """With a fixed schedule of steps; every column, relative to its largest value."""
     n, step = (6, 0.1) if gdim == 2 else (4, 0.25)
-    together = history(pried_and_pressed(n=n, gdim=gdim, rtol=1e-11), 1.0, StepControl.fixed(step))
-    alone = history(pried_and_pressed(MPI.COMM_SELF, n, gdim, rtol=1e-11), 1.0, StepControl.fixed(step))
+    together = history(
+        pried_and_pressed(n=n, gdim=gdim, tolerances=Tolerances(rtol=1e-11)), 1.0, StepControl.fixed(step)
+    )
+    alone = history(
+        pried_and_pressed(MPI.COMM_SELF, n, gdim, tolerances=Tolerances(rtol=1e-11)), 1.0, StepControl.fixed(step)
+    )
     assert together["crack_broken"][-1] > 0.05
     for name, values in alone.items():
         # the closure is a small difference of energies: relative to them
@@ -219,7 +228,7 @@ def test_reactions_balance_a_dead_load():
     b = make_blocks(3)
     supports = [Support(b.state, b.face(2, 0.0), i, name=f"base_{'xyz'[i]}") for i in range(3)]
     load = Traction(b.state, b.face(2, 1.0), (1e-3, 2e-3, -3e-3), lambda t: 2 * t)
-    mechanics = Mechanics(b.state, [b.solid(), b.crack(WEAK), load], supports, rtol=1e-10)
+    mechanics = Mechanics(b.state, [b.solid(), b.crack(WEAK), load], supports, tolerances=Tolerances(rtol=1e-10))
     rows = history(mechanics, 1.0, StepControl.fixed(0.5))
     for axis, traction in zip("xyz", (1e-3, 2e-3, -3e-3), strict=True):
         assert rows[f"load_force_{axis}"][-1] == pytest.approx(2 * traction)

@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from cutsim.base.compat import cell_partitioner, form
 from cutsim.fields.space import crack_measure_entities, cracked_space, locate_dofs
+from cutsim.solvers.convergence import Criteria, Tolerances
 from cutsim.solvers.newton import NonlinearProblem
 
 WORLD = MPI.COMM_WORLD
@@ -98,7 +99,9 @@ def poisson(V, source, bcs):
     """Solution of −Δu = source."""
     uh, v = fem.Function(V), ufl.TestFunction(V)
     F = (ufl.inner(ufl.grad(uh), ufl.grad(v)) - fem.Constant(V.mesh, source) * v) * ufl.dx
-    with NonlinearProblem(F, uh, petsc_options_prefix="poisson_", bcs=bcs, rtol=1e-12) as problem:
+    with NonlinearProblem(
+        F, uh, petsc_options_prefix="poisson_", bcs=bcs, criteria=Criteria(Tolerances(rtol=1e-12))
+    ) as problem:
         assert problem.solve().converged
     return uh
 

@@ -156,6 +156,16 @@ def test_smallest_step_is_named_and_history_is_kept(tmp_path):
     assert mechanics.terms[0].diagnose() is None, "the state is the last good one"
 
 
+def test_a_step_without_convergence_says_after_how_many_iterations():
+    b = make_blocks()
+    supports = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
+    supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: t))
+    terms = [b.solid(NeoHookean(E, NU)), b.crack(WEAK)]
+    mechanics = Mechanics(b.state, terms, supports, petsc_options={"snes_max_it": 2})
+    with pytest.raises(StepError, match=r"succeeds \(smallest = 0.1\): no convergence after 2 iterations"):
+        run(mechanics, 0.1, StepControl(0.1, 0.1, smallest=0.1))
+
+
 def test_limit_on_damage_makes_steps_smaller():
     free, limited = [], []
     run(opening_blocks(), 0.6, StepControl.fixed(0.05), free.append)

@@ -34,6 +34,7 @@ from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHook
 from cutsim.materials.rubbers import MooneyRivlin, Ogden
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
+from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.fracture import JIntegral
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path
@@ -165,7 +166,7 @@ EXACT = {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "m
 
 def test_newton_is_quadratic():
     _, m = inflated((2, 4), 2, "taylor-hood", pressure=shell_pressure(1.2))
-    m = Mechanics(m.state, m.terms, m.supports, rtol=1e-14, petsc_options=EXACT)
+    m = Mechanics(m.state, m.terms, m.supports, tolerances=Tolerances(rtol=1e-14), petsc_options=EXACT)
     m.begin(0.8)
     outcome = m.solve("basic")
     r = np.array([r for r in outcome.residuals if r > 1e-13])
@@ -188,7 +189,7 @@ def stretched(cell, *, axisymmetric=False, material=None, stretch=1.5, n=3, volu
     supports = [Support(state, face, i) for i, face in enumerate(faces)]
     supports.append(Support(state, top, gdim - 1, lambda t: (stretch - 1) * t, name="pull"))
     solid = Solid(state, material or IsochoricNeoHookean(E, INCOMPRESSIBLE), volumetric=volumetric)
-    return Mechanics(state, [solid], supports, rtol=1e-12), solid
+    return Mechanics(state, [solid], supports, tolerances=Tolerances(rtol=1e-12)), solid
 
 
 @pytest.mark.mpi
@@ -275,7 +276,9 @@ def errors(cell, n):
     material = LinearElastic(E, 0.5 - 1e-10)
     solid, forces = Solid(state, material, volumetric="taylor-hood"), Manufactured(state, material.shear)
     left = mesh.locate_entities_boundary(domain, 1, at(0, 0.0))
-    m = Mechanics(state, [solid, forces], [Support(state, left, i) for i in range(2)], rtol=1e-12)
+    m = Mechanics(
+        state, [solid, forces], [Support(state, left, i) for i in range(2)], tolerances=Tolerances(rtol=1e-12)
+    )
     final(m, step=1.0)
     differences = state.u - forces.u, solid.fields["body_pressure"] - forces.p
     return [np.sqrt(integrate(form(ufl.inner(d, d) * forces._dx))) for d in differences]
@@ -328,7 +331,7 @@ def test_pressure_jumps_across_a_crack():
     supports = [Support(state, b.upper, i, dim=2) for i in range(2)]
     supports += [Support(state, sides[0], 0), Support(state, b.face(1, 0.0), 1)]
     supports.append(Support(state, sides[1], 0, lambda t: (stretch - 1) * t))
-    final(Mechanics(state, [solid], supports, rtol=1e-11), step=0.5)
+    final(Mechanics(state, [solid], supports, tolerances=Tolerances(rtol=1e-11)), step=0.5)
     values = fem.Function(fem.functionspace(state.mesh, ("DG", 0)))
     values.interpolate(fem.Expression(solid.fields["body_pressure"], np.array([[0.5, 0.5]])))
     expected = shear * ((stretch**2 + 1 + stretch**-2) / 3 - stretch**-2)
@@ -380,7 +383,9 @@ def test_halves_of_a_crack_are_torn_like_others(rheology):
         supports.append(Support(state, b.face(1, 1.0), 1, lambda t: 0.4 * t, name="pull"))
         solid = Solid(state, NeoHookean(20.0, 0.4), volumetric=volumetric, **RHEOLOGIES[rheology])
         crack = Crack(state, b.facets, b.lower, EXPONENTIAL, young=20.0)
-        rows[volumetric] = final(Mechanics(state, [solid, crack], supports, rtol=1e-11), step=0.05)
+        rows[volumetric] = final(
+            Mechanics(state, [solid, crack], supports, tolerances=Tolerances(rtol=1e-11)), step=0.05
+        )
     assert rows["taylor-hood"]["energy_fracture"] > 0.1
     for name in ("pull_force", "energy_strain", "energy_fracture", "energy_viscous", "energy_closure"):
         assert rows["taylor-hood"][name] == pytest.approx(rows["full"][name], rel=1e-6, abs=1e-9)
@@ -398,7 +403,7 @@ def test_ball_pressed_into_rubber():
         ball = ToolContact(b.state, Ball(0.5), path, [surface], contact=contact, friction=Coulomb(0.3), name="ball")
         supports = [b.hold(at(0, 0), 0), b.hold(at(1, 0), 1, name="plate")]
         solid = Solid(b.state, IsochoricNeoHookean(E, 0.4999), volumetric=volumetric)
-        last = final(Mechanics(b.state, [solid, ball], supports, rtol=1e-11), step=0.25)
+        last = final(Mechanics(b.state, [solid, ball], supports, tolerances=Tolerances(rtol=1e-11)), step=0.25)
         assert last["ball_force_y"] == pytest.approx(last["plate_force"], rel=1e-7)
         forces.append(last["ball_force_y"])
     assert forces[1] == pytest.approx(forces[0], rel=5e-3)
@@ -429,7 +434,9 @@ def test_blade_between_crack_faces():
         bottom = mesh.locate_entities_boundary(domain, 1, at(1, -2.0))
         supports = [Support(state, bottom, i) for i in range(2)]
         solid = Solid(state, IsochoricNeoHookean(E, 0.4999), volumetric=volumetric)
-        rows.append(final(Mechanics(state, [solid, faces, *halves], supports, rtol=1e-11), step=0.125))
+        rows.append(
+            final(Mechanics(state, [solid, faces, *halves], supports, tolerances=Tolerances(rtol=1e-11)), step=0.125)
+        )
     assert rows[1]["right_force_x"] == pytest.approx(-rows[1]["left_force_x"], rel=1e-6)
     assert abs(rows[1]["right_force_x"]) > 0.02
     assert rows[1]["right_force_x"] == pytest.approx(rows[0]["right_force_x"], rel=1e-3)
@@ -452,7 +459,7 @@ def test_rubber_slides_far_on_rubber():
         ]
         path = (lambda t: 0.5 * max(t - 0.25, 0), lambda t: -0.05 * min(4 * t, 1))
         supports = [*b.drive(0, 0, (0.0, 0.0), "base"), *b.drive(1, 1, path, "top")]
-        mechanics = Mechanics(b.state, [*bodies, pair], supports, rtol=1e-10)
+        mechanics = Mechanics(b.state, [*bodies, pair], supports, tolerances=Tolerances(rtol=1e-10))
         last = final(mechanics, step=0.125)
         assert pair.pattern > 2, "the surfaces have met other facets"
         assert last["base_y_force"] == pytest.approx(-last["top_y_force"], rel=1e-7)
@@ -479,7 +486,7 @@ def layered(comm=MPI.COMM_WORLD, **options):
     supports += [
         Support(state, ends[1], i, value, name=f"end_{i}") for i, value in enumerate((lambda t: 0.2 * t, 0.0, 0.0))
     ]
-    return Mechanics(state, layers, supports, rtol=1e-10, **options)
+    return Mechanics(state, layers, supports, tolerances=Tolerances(rtol=1e-10), **options)
 
 
 @pytest.mark.parametrize(
@@ -545,7 +552,7 @@ def test_oscillation_keeps_its_energy():
         b = Body(rectangle([(0, 0), (1, 1)], (2, 2)), 2, axisymmetric=False)
         solid = Solid(b.state, IsochoricNeoHookean(E, 0.4999), volumetric="taylor-hood", density=1.0)
         supports = [b.hold(at(1, 0), i) for i in range(2)]
-        m = Mechanics(b.state, [solid], supports, analysis="dynamic", rtol=1e-10)
+        m = Mechanics(b.state, [solid], supports, analysis="dynamic", tolerances=Tolerances(rtol=1e-10))
         m.inertia.set_velocity(lambda x: np.array([0.3 * x[1], 0 * x[0]]))
         last = final(m, step=step)
         assert 0.01 < last["energy_strain"]

@@ -16,6 +16,7 @@ from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
+from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path, Plane
 from cutsim.tools.tool_contact import ToolContact
@@ -34,7 +35,7 @@ def indented(gdim, friction=FRICTION):
     top = Surface.exterior(state, b.face(gdim - 1, 1.0))
     ball = ToolContact(state, Ball(0.35), path, [top], contact=CONTACT, friction=friction)
     supports = [Support(state, b.face(gdim - 1, 0.0), i, name=f"base_{'xyz'[i]}") for i in range(gdim)]
-    return Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], supports, rtol=1e-11), ball
+    return Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], supports, tolerances=Tolerances(rtol=1e-11)), ball
 
 
 @pytest.mark.parametrize("gdim", [2, 3])

@@ -19,6 +19,7 @@ from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import NeoHookean
+from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
@@ -62,7 +63,7 @@ def indented(gdim, shape, path, n, degree=1, friction=FRICTION, comm=MPI.COMM_WO
     else:
         tool = ToolContact(state, shape, path, [Surface.exterior(state, top)], **options)
     supports = [Support(state, b.face(gdim - 1, 0.0), i, name=f"base_{'xyz'[i]}") for i in range(gdim)]
-    return Mechanics(state, [Solid(state, NeoHookean(E, NU)), tool], supports, rtol=1e-11), tool
+    return Mechanics(state, [Solid(state, NeoHookean(E, NU)), tool], supports, tolerances=Tolerances(rtol=1e-11)), tool
 
 
 def forces(rows, gdim, name="tool_force_{}"):

@@ -29,7 +29,9 @@ from cutsim.fields.state import State
 from cutsim.fields.twins import unjoined
 from cutsim.interface.crack import Crack
 from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.solvers.convergence import TOLERANCES, Criteria, Tolerances
 from cutsim.solvers.newton import NonlinearProblem, Outcome
+from cutsim.solvers.system import Structure
 
 # displacement over the size of the mesh at which a solve is given up
 _RUNAWAY = 100.0
@@ -59,7 +61,7 @@ class Mechanics:
         petsc_options: PETSc options without prefix; they win over the presets.
         petsc_options_prefix: Prefix of all PETSc options of the problem, no other's; by default "cut_" for the first
             problem of a process, then "cut2_" and so on.
-        rtol: Residual tolerance relative to the reactions.
+        tolerances: When a state is in equilibrium, by residual and, if asked for, displacement and energy.
 
     Attributes:
         inertia: Velocity, acceleration and momentum; None if quasi-static.
@@ -81,7 +83,7 @@ class Mechanics:
         mass: Literal["consistent", "lumped"] = "consistent",
         petsc_options: Mapping[str, Any] | None = None,
         petsc_options_prefix: str | None = None,
-        rtol: float = 1e-8,
+        tolerances: Tolerances = TOLERANCES,
     ) -> None:
         names = [t.name for t in terms] + [s.name for s in supports if s.name]
         require("terms", len(terms), len(terms) > 0, "at least one term")
@@ -105,15 +107,15 @@ class Mechanics:
             state.u,
             bcs=[s.bc for s in supports],
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
-            symmetric=all(t.symmetric for t in terms),
-            inertia=self.inertia is not None,
-            terms=[t for t in terms if t.assembles],
-            multipliers=[m for t in terms for m in t.multipliers],
-            interface_dofs=self._interface_nodes(interfaces) if interfaces else None,
+            structure=Structure(
+                symmetric=all(t.symmetric for t in terms),
+                terms=[t for t in terms if t.assembles],
+                multipliers=[m for t in terms for m in t.multipliers],
+                interface_dofs=self._interface_nodes(interfaces) if interfaces else None,
+            ),
+            criteria=Criteria(tolerances, largest=_RUNAWAY * size, by_start=self.inertia is not None),
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
-            rtol=rtol,
-            largest=_RUNAWAY * size,
         )
         self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
         self._apart = unjoined(state.mesh, [t.facets for t in terms if isinstance(t, SurfacePair)])
@@ -208,12 +210,7 @@ class Mechanics:
             # every term takes part: a list, because any() would stop at the first
             if not outcome.converged or not any([t.augment() for t in self.terms]):
                 break
-            again = self.problem.solve(line_search)
-            outcome = replace(
-                again,
-                iterations=outcome.iterations + again.iterations,
-                linear_iterations=outcome.linear_iterations + again.linear_iterations,
-            )
+            outcome = self.problem.solve(line_search).after(outcome)
         else:
             message = f"contact not settled by {AUGMENTATIONS} augmentations"
             outcome = replace(outcome, converged=False, message=message)

@@ -92,12 +92,10 @@ class ThermoMechanics:
         Returns:
             The outcome of the mechanics, iterations summed over the passes; that of heat if this has failed.
         """
-        iterations = linear_iterations = 0
+        previous: Outcome | None = None
         for _ in range(1 if self.iterate is None else PASSES):
             outcome = self.mechanics.solve(line_search)
-            iterations += outcome.iterations
-            linear_iterations += outcome.linear_iterations
-            outcome = replace(outcome, iterations=iterations, linear_iterations=linear_iterations)
+            previous = outcome = outcome if previous is None else outcome.after(previous)
             if not outcome.converged:
                 return outcome
             self.mechanics.evaluate()

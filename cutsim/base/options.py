@@ -33,6 +33,10 @@ class Options:
     def __contains__(self, name: str) -> bool:
         return bool(self._database.hasName(name))
 
+    def get(self, name: str) -> str:
+        """Value of an option that is set."""
+        return str(self._database.getString(name))
+
     def set(self, name: str, value: Any) -> None:
         """Set an option, overwriting it."""
         self._database.setValue(name, value)

@@ -18,11 +18,15 @@ from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatBalance, HeatTerm
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.loads import PrescribedTemperature
+from cutsim.solvers.convergence import Criteria, Tolerances
 from cutsim.solvers.newton import NonlinearProblem, Outcome
+from cutsim.solvers.system import Structure
 
 #: Smallest turnover to which the closure of the audit refers, as a fraction of the heat of all bodies above absolute
 #: zero. The tolerance of the solver, relative to that heat, then stays invisible while nothing happens.
 SMALLEST_HEAT = 1e-6
+#: The problem is linear: what is left is rounding.
+TOLERANCES = Tolerances(rtol=1e-12)
 
 # problems that live in one process must not share PETSc options
 _prefixes = chain(["heat_"], (f"heat{n}_" for n in count(2)))
@@ -38,7 +42,7 @@ class HeatTransfer:
         petsc_options: PETSc options without prefix; they win over the presets.
         petsc_options_prefix: Prefix of all PETSc options of the problem, no other's; by default "heat_" for the first
             problem of a process, then "heat2_" and so on.
-        rtol: Residual tolerance relative to the heat flows.
+        tolerances: When the heat flows balance.
 
     Raises:
         ValueError: A node has no body, two terms or prescribed temperatures share a name, or two prescribe different
@@ -54,7 +58,7 @@ class HeatTransfer:
         *,
         petsc_options: Mapping[str, Any] | None = None,
         petsc_options_prefix: str | None = None,
-        rtol: float = 1e-12,
+        tolerances: Tolerances = TOLERANCES,
     ) -> None:
         names = [t.name for t in terms] + [p.name for p in prescribed if p.name]
         bodies = [t for t in terms if isinstance(t, HeatBody)]
@@ -72,12 +76,11 @@ class HeatTransfer:
             temperature.value,
             bcs=[p.bc for p in prescribed],
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
-            symmetric=all(t.symmetric for t in terms),
-            terms=[t for t in terms if t.assembles],
-            inertia=True,  # heat capacity is: prescribed temperatures may take no heat
+            structure=Structure(all(t.symmetric for t in terms), [t for t in terms if t.assembles]),
+            # heat capacity takes part, and prescribed temperatures may take no heat
+            criteria=Criteria(tolerances, by_start=True),
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
-            rtol=rtol,
         )
         absolute = max(abs(temperature.maximum() - temperature.absolute_zero), 1.0)
         scale = SMALLEST_HEAT * absolute * sum(b.content for b in bodies)

@@ -13,6 +13,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from cutsim.solvers.newton import NonlinearProblem
+from cutsim.solvers.system import Structure
 
 EDGE, LIFT, STEPS = 10.0, 5.0, 10
 E, NU = 1.0, 0.45
@@ -38,7 +39,9 @@ def stretch(n: int) -> tuple[float, int, int, Usage]:
     lift = fem.Constant(domain, np.zeros(3))
     bottom, top = (fem.locate_dofs_geometrical(V, lambda x, z=z: np.isclose(x[2], z)) for z in (0.0, EDGE))
     bcs = [fem.dirichletbc(np.zeros(3), bottom, V), fem.dirichletbc(lift, top, V)]
-    with NonlinearProblem(residual(u), u, petsc_options_prefix="cube_", bcs=bcs, symmetric=True) as problem:
+    with NonlinearProblem(
+        residual(u), u, petsc_options_prefix="cube_", bcs=bcs, structure=Structure(symmetric=True)
+    ) as problem:
         with measure(comm) as usage:
             outcomes = []
             for step in range(1, STEPS + 1):
