@@ -280,7 +280,7 @@ def impact(comm=MPI.COMM_WORLD, n=4, law=None, material=None, **options):
 @pytest.mark.parametrize("scheme", [Newmark(), GeneralisedAlpha(0.8)], ids=str)
 def test_impact_keeps_momentum_and_energy(scheme):
     """Equal bars exchange their velocities in the time 2 L/c in which a wave runs to and fro (thin-bar theory)."""
-    b, mechanics = impact(n=8, scheme=scheme, rtol=1e-12)
+    b, mechanics = impact(n=8, scheme=scheme, tolerances=Tolerances(rtol=1e-12))
     initial = 0.5 * RHO * (FAST + SLOW)
     until = GAP / (FAST - SLOW) + 2 * 0.5 / np.sqrt(E / RHO) + 0.2
     momenta, audits = [], []
@@ -351,7 +351,7 @@ def test_friction_brakes_a_sliding_block():
 
 def test_blocks_that_tear_apart_pay_the_toughness_with_kinetic_energy():
     law = Exponential.from_parameters(toughness=0.1, opening=0.05, shear_toughness=0.1, shear_opening=0.05)
-    _, mechanics = impact(law=law, rtol=1e-11)
+    _, mechanics = impact(law=law, tolerances=Tolerances(rtol=1e-11))
     rows = history(mechanics, 0.6, StepControl.fixed(0.005))
     assert rows["energy_fracture"][-1] == pytest.approx(0.1, rel=1e-3)
     lost = rows["energy_initial"] - rows["energy_kinetic"] - rows["energy_strain"]
@@ -363,7 +363,7 @@ def test_blocks_that_tear_apart_pay_the_toughness_with_kinetic_energy():
 @pytest.mark.parametrize("mass", ["consistent", "lumped"])
 def test_motion_does_not_depend_on_the_number_of_ranks(mass):
     def rows(comm):
-        options = {"scheme": GeneralisedAlpha(0.7), "mass": mass, "rtol": 1e-11}
+        options = {"scheme": GeneralisedAlpha(0.7), "mass": mass, "tolerances": Tolerances(rtol=1e-11)}
         _, mechanics = impact(comm, material=NeoHookean(E, 0.3), **options)
         return history(mechanics, 1.0, StepControl.fixed(0.04))
 
