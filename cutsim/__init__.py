@@ -36,6 +36,9 @@ from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.solvers.convergence import Tolerances
+from cutsim.studies.body import CrackedBody, cracked_block
+from cutsim.studies.drive import Drive
+from cutsim.studies.fixture import Fixture
 from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock
 from cutsim.tools.pointed import Blade, Needle
@@ -59,10 +62,13 @@ __all__ = [
     "Coulomb",
     "Crack",
     "CrackFriction",
+    "CrackedBody",
     "DispersedFibres",
+    "Drive",
     "EllipsoidalFibres",
     "Exponential",
     "ExponentialFibres",
+    "Fixture",
     "FlatPunch",
     "FrictionLaw",
     "FungOrthotropic",
@@ -115,6 +121,7 @@ __all__ = [
     "TriangulatedTool",
     "Triangulation",
     "Yeoh",
+    "cracked_block",
     "cracked_space",
     "geometry",
     "laminate",

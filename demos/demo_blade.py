@@ -36,12 +36,24 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from cutsim import AdiabaticTool, Blade, Exponential, NeoHookean, StepControl, TaggedMesh, read_geo, run
+from cutsim import (
+    AdiabaticTool,
+    Blade,
+    Drive,
+    Exponential,
+    Insertion,
+    NeoHookean,
+    StepControl,
+    TaggedMesh,
+    cracked_block,
+    read_geo,
+    run,
+)
 from cutsim.results.output import claim_folder, interpolate
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
-from cutsim.studies.insertion import Insertion, ThermalCut
+from cutsim.studies.insertion_heat import Conductor, ThermalCut, heated
 from cutsim.studies.insertion_work import audited_toughness, steady_force
 
 MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
@@ -93,7 +105,7 @@ SETTINGS = {
 # materials; here the block takes all of it, which is the upper bound of its temperature.
 
 ROOM = 293.15
-SILICONE = ThermalCut(density=1.1e-9, capacity=1.3e9, conductivity=0.2, blade=AdiabaticTool(share=1.0))
+SILICONE = ThermalCut(Conductor(density=1.1e-9, capacity=1.3e9, conductivity=0.2), AdiabaticTool(share=1.0))
 
 Summary = dict[str, float | list[float]]
 History = dict[str, np.ndarray]
@@ -153,15 +165,13 @@ def push(
     law = Exponential.from_parameters(strength=strength, toughness=setting.toughness)
     forward, lateral = (0.0, -1.0, 0.0)[:dim], (1.0, 0.0, 0.0)[:dim]
     cut = Insertion.build(
-        domain,
-        NeoHookean(young, poisson),
-        law,
+        cracked_block(domain, NeoHookean(young, poisson), law, viscosity=VISCOSITY),
         Blade(HALF_ANGLE, setting.radius, THICKNESS / 2, forward, lateral),
+        Drive(speed=1.0, entry_time=1.0),
         notch=setting.mesh["notch"],
         friction=friction,
-        viscosity=VISCOSITY,
     )
-    problem = cut.heated(SILICONE, ROOM) if heat else cut.mechanics
+    problem = heated(cut, SILICONE, ROOM) if heat else cut.mechanics
     control = StepControl(first=0.02, largest=0.05 if friction else 0.1, smallest=1e-4, closure=5e-3)
     until = cut.time_of(setting.depth)
     with Recording(
@@ -171,7 +181,7 @@ def push(
         title=f"blade, μ = {friction:g}" if friction else "blade",
         show={"depth": "depth", "force": "force"},
         extra=cut.columns,
-        derived={"cauchy_stress": cut.solid.cauchy_stress(cut.state.u)},
+        derived={"cauchy_stress": cut.body.solids[0].cauchy_stress(cut.state.u)},
     ) as recording:
         try:
             run(problem, until, control, recording)
@@ -197,16 +207,17 @@ def summarise(cut: Insertion, history: History, law: Exponential, seconds: float
     depth, force = history["depth"], history["force"]
     end = float(depth[-1])
     width = 1.0 if dim == 2 else WIDTH
-    late = depth >= end - 0.5 * (end - cut.tip)
+    start = cut.motion.start_depth
+    late = depth >= end - 0.5 * (end - start)
     summary: Summary = {
         "toughness_given": law.toughness[0],
-        "toughness_in_the_books": audited_toughness(history, cut.tip + 0.4 * (end - cut.tip), end, cut.whole),
+        "toughness_in_the_books": audited_toughness(history, start + 0.4 * (end - start), end, cut.symmetry_factor),
         "mean_force_per_width_second_half": float(np.trapezoid(force[late], depth[late]) / np.ptp(depth[late])) / width,
         "largest_force": float(force.max()),
         "depth": end,
         "cut_area": float(history["cut"][-1]),
         "largest_closure": float(np.abs(history["energy_closure"]).max()),
-        "largest_imbalance": float(history["imbalance"][depth > cut.tip].max()),
+        "largest_imbalance": float(history["imbalance"][depth > start].max()),
         "steps": len(depth),
         "rejected_steps": float(history["cuts"].sum()),
         "newton_iterations": float(history["newton"].sum()),
@@ -238,20 +249,20 @@ def draw(cut: Insertion, history: History, law: Exponential, out: Path, temperat
             title="Blade cutting of silicone",
             references=expected,
         )
-        whole = {n: v * cut.whole if n.startswith(("work", "energy")) else v for n, v in history.items()}
+        whole = {n: v * cut.symmetry_factor if n.startswith(("work", "energy")) else v for n, v in history.items()}
         whole["energy_closure"] = history["energy_closure"]
         plot_energy(out / "energy.png", whole, x="time", xlabel="way of the tool [mm]")
     u = cut.state.u
     von_mises = fem.Function(fem.functionspace(cut.state.mesh, ("DG", 0)))
-    stress = ufl.dev(cut.solid.cauchy_stress(u))
+    stress = ufl.dev(cut.body.solids[0].cauchy_stress(u))
     interpolate(von_mises, ufl.sqrt(1.5 * ufl.inner(stress, stress)))
     fields = {"von Mises": von_mises}
     if temperature is not None:
         fields["heating"] = fem.Function(von_mises.function_space)
         interpolate(fields["heating"], temperature - ROOM)
-    grid = gather_grid(u, fields)
-    facets = gather_facets(u, cut.crack.points.facets, cut.crack.facet_mean("damage"))
-    tip = np.asarray(cut.halves[0].position.value)
+    grid, crack = gather_grid(u, fields), cut.body.cracks[0]
+    facets = gather_facets(u, crack.points.facets, crack.facet_mean("damage"))
+    tip = np.asarray(cut.contacts[0].position.value)
     tip = np.where(np.arange(dim) == 1, tip, 0.0)
     edge = None if dim == 2 else (0.0, 0.0, WIDTH)
     start = tip if dim == 2 else tip - (0.0, 0.0, WIDTH / 2)
@@ -267,14 +278,8 @@ def draw(cut: Insertion, history: History, law: Exponential, out: Path, temperat
             tool=tool,
             crack=facets if field == "von Mises" else None,
             mirror=("z",) if dim == 3 else (),
-            window=(-7.0, 7.0, -4.4, 1.5, -5.5, 5.5) if dim == 3 else (-4.2, 4.2, -cut_height(cut), 1.0, 0.0, 0.0),
+            window=(-7.0, 7.0, -4.4, 1.5, -5.5, 5.5) if dim == 3 else (-4.2, 4.2, -cut.frame.height, 1.0, 0.0, 0.0),
         )
-
-
-def cut_height(cut: Insertion) -> float:
-    """Height of the block [mm]."""
-    y = cut.state.mesh.geometry.x[:, 1]
-    return -float(cut.state.mesh.comm.allreduce(float(y.min()), MPI.MIN))
 
 
 # With friction above the tangent of the half angle, 0.2, the faces stick to the blade and are dragged along: little is

@@ -21,7 +21,18 @@ import typer
 from mpi4py import MPI
 from scipy.optimize import root_scalar
 
-from cutsim import Blade, Exponential, NeoHookean, StepControl, TaggedMesh, read_geo, run
+from cutsim import (
+    Blade,
+    Drive,
+    Exponential,
+    Insertion,
+    NeoHookean,
+    StepControl,
+    TaggedMesh,
+    cracked_block,
+    read_geo,
+    run,
+)
 from cutsim.identify import (
     Fit,
     MaterialFit,
@@ -35,7 +46,6 @@ from cutsim.identify import (
 from cutsim.materials.library import material
 from cutsim.results.output import write_summary
 from cutsim.results.plots import Curve, plot_curves
-from cutsim.studies.insertion import Insertion
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 COMM = MPI.COMM_WORLD
@@ -114,14 +124,13 @@ def cut(
     domain: TaggedMesh, specimen: Specimen, solid: NeoHookean, strength: float, values: dict[str, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Depth and force per width [N/mm] while the blade is pushed."""
+    bond = Exponential.from_parameters(strength=strength, toughness=values["toughness"])
     problem = Insertion.build(
-        domain,
-        solid,
-        Exponential.from_parameters(strength=strength, toughness=values["toughness"]),
+        cracked_block(domain, solid, bond, viscosity=0.002),
         Blade(HALF_ANGLE, specimen.radius, HALF_THICKNESS),
+        Drive(speed=1.0, entry_time=1.0),
         notch=specimen.notch,
         friction=values["friction"],
-        viscosity=0.002,
     )
     rows = []
     control = StepControl(first=specimen.step, largest=specimen.step, smallest=1e-4)

@@ -24,12 +24,11 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from cutsim import Exponential, Needle, NeoHookean, StepControl, read_geo, run
+from cutsim import Drive, Exponential, Insertion, Needle, NeoHookean, StepControl, cracked_block, read_geo, run
 from cutsim.results.output import claim_folder, interpolate
 from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism, revolved
 from cutsim.results.plots import Curve, plot_curves, plot_energy, plot_parts
 from cutsim.results.recording import Recording
-from cutsim.studies.insertion import Insertion
 from cutsim.studies.insertion_work import TwoInsertions, force_parts
 
 MESHES = Path(__file__).parent.parent / "meshes"
@@ -104,12 +103,12 @@ def main(
         title="needle",
         show={"depth": "depth", "force": "force"},
         extra=cut.columns,
-        derived={"cauchy_stress": cut.solid.cauchy_stress(cut.state.u)},
+        derived={"cauchy_stress": cut.body.solids[0].cauchy_stress(cut.state.u)},
     ) as recording:
         run(cut.mechanics, until, control, recording)
     history = recording.columns()
     draw(cut, out)
-    parts = force_parts(history, cut.whole, setting.window)
+    parts = force_parts(history, cut.symmetry_factor, setting.window)
     summary = summarise(cut, history, parts, law, time.perf_counter() - begun)
     recording.summary(summary)
     if MPI.COMM_WORLD.rank == 0:
@@ -117,20 +116,14 @@ def main(
     check(summary, long=dim == 2 or not quick)
 
 
-def problem(setting: Setting, law: Exponential, friction: float, dim: int, turn: float | None) -> Insertion:
+def problem(setting: Setting, law: Exponential, friction: float, dim: int, turning_depth: float | None) -> Insertion:
     """Block, crack and needle."""
     push, lateral = ((0.0, -1.0, 0.0)[:dim], (1.0, 0.0, 0.0)[:dim])
     needle = Needle(np.radians(setting.half_angle), setting.tip_radius, setting.radius, push, lateral)
-    return Insertion.build(
-        read_geo(MESHES / f"{setting.geometry}.geo", MPI.COMM_WORLD, setting.mesh, gdim=dim),
-        NeoHookean(YOUNG, POISSON),
-        law,
-        needle,
-        notch=setting.mesh["notch"],
-        friction=friction,
-        viscosity=VISCOSITY,
-        turn=turn,
-    )
+    domain = read_geo(MESHES / f"{setting.geometry}.geo", MPI.COMM_WORLD, setting.mesh, gdim=dim)
+    body = cracked_block(domain, NeoHookean(YOUNG, POISSON), law, viscosity=VISCOSITY, axisymmetric=dim == 2)
+    drive = Drive(speed=1.0, entry_time=1.0, turning_depth=turning_depth)
+    return Insertion.build(body, needle, drive, notch=setting.mesh["notch"], friction=friction)
 
 
 # ## What came out
@@ -142,7 +135,7 @@ def summarise(cut: Insertion, history: History, parts: History, law: Exponential
         "toughness_given": law.toughness[0],
         "largest_force": float(history["force"].max()),
         "depth": float(history["depth"].max()),
-        "new_area": cut.whole * float(history["crack_broken"].max()),
+        "new_area": cut.symmetry_factor * float(history["crack_broken"].max()),
         **{f"{name.replace(' ', '_')}_at_the_end": float(part[-1]) for name, part in parts.items() if name != "depth"},
         "largest_closure": float(np.abs(history["energy_closure"]).max()),
         "steps": len(history["time"]),
@@ -152,7 +145,7 @@ def summarise(cut: Insertion, history: History, parts: History, law: Exponential
         "ranks": cut.state.mesh.comm.size,
         "seconds": seconds,
     }
-    if cut.turn is not None:
+    if cut.motion.turning_depth is not None:
         both = TwoInsertions.of(history, cut)
         summary |= {"work_first": both.first, "work_second": both.second}
         summary |= {"toughness_apparent": both.apparent, "toughness_of_two_insertions": both.toughness}
@@ -169,16 +162,18 @@ def plot(out: Path, cut: Insertion, history: History, parts: History) -> None:
     plot_parts(out / "parts.png", parts["depth"], stack, parts["force"], title="What the force is spent on", **labels)
     time = history["time"]
     down = cut.time_of(float(history["depth"].max()))
-    up = down if cut.turn is None else cut.time_of(cut.tip, 2)
+    up = down if cut.motion.turning_depth is None else cut.time_of(cut.motion.start_depth, 2)
     legs = {"-": time <= down, ":": (time >= down) & (time <= up), "--": time >= up}  # in, back, in again
     curves = [
         Curve(history["depth"][leg], history[column][leg], place if style == "-" else "", f"C{i}{style}")
         for i, (place, column) in enumerate({"needle": "force", "tip": "tip_force", "shaft": "shaft_force"}.items())
         for style, leg in legs.items()
     ]
-    title = "Force on tip and shaft" + ("" if cut.turn is None else ": in, back (dotted) and in again (dashed)")
+    title = "Force on tip and shaft" + (
+        "" if cut.motion.turning_depth is None else ": in, back (dotted) and in again (dashed)"
+    )
     plot_curves(out / "force.png", curves, title=title, **labels)
-    whole = {n: v * cut.whole if n.startswith(("work", "energy")) else v for n, v in history.items()}
+    whole = {n: v * cut.symmetry_factor if n.startswith(("work", "energy")) else v for n, v in history.items()}
     whole["energy_closure"] = history["energy_closure"]
     plot_energy(out / "energy.png", whole, x="time", xlabel="way of the needle [mm]")
 
@@ -187,17 +182,18 @@ def draw(cut: Insertion, out: Path) -> None:
     """The body in a plane through the axis, and in space also the plane of the crack."""
     dim, u = cut.state.mesh.geometry.dim, cut.state.u
     von_mises = fem.Function(fem.functionspace(cut.state.mesh, ("DG", 0)))
-    stress = ufl.dev(cut.solid.cauchy_stress(u))
+    stress = ufl.dev(cut.body.solids[0].cauchy_stress(u))
     interpolate(von_mises, ufl.sqrt(1.5 * ufl.inner(stress, stress)))
     grid = gather_grid(u, {"von Mises": von_mises})
-    facets = gather_facets(u, cut.crack.points.facets, cut.crack.facet_mean("damage"))
-    depth = -float(cut.halves[0].position.value[1])
+    crack = cut.body.cracks[0]
+    facets = gather_facets(u, crack.points.facets, crack.facet_mean("damage"))
+    depth = cut.depth
     outline, tip = cut.tool.outline(depth + 1.0), (0.0, -depth, 0.0)
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     label = "von Mises stress [MPa]"
     if dim == 2:
         wall = (
-            cut.domain.mesh.comm.allreduce(float(cut.crack.points.submesh.geometry.x[:, 0].max(initial=0.0)), MPI.MAX),
+            cut.state.mesh.comm.allreduce(float(crack.points.submesh.geometry.x[:, 0].max(initial=0.0)), MPI.MAX),
             0,
             0,
         )

@@ -39,15 +39,13 @@ from dolfinx import fem
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
-from cutsim import Blade, Exponential, LayeredBlock, StepControl, laminate, run
+from cutsim import Blade, Drive, Exponential, Fixture, Insertion, LayeredBlock, StepControl, laminate, run
 from cutsim.base.compat import nodal_expression
 from cutsim.results.output import claim_folder
 from cutsim.results.pictures import draw_body, gather_grid, prism
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
-from cutsim.studies.insertion import TIP_IN_NOTCH
 from cutsim.studies.layered import Layer, skin
-from cutsim.studies.layered_cut import LayeredCut
 
 COMM = MPI.COMM_WORLD
 HALF_ANGLE, HALF_THICKNESS = float(np.deg2rad(12.0)), 0.2  # of the blade [mm]
@@ -107,7 +105,7 @@ def main(
     check(cut, summary, history)
 
 
-def build(setting: Setting, stretch: float) -> LayeredCut:
+def build(setting: Setting, stretch: float) -> Insertion:
     """Mesh, layers and blade."""
     layers = skin(*setting.laws)
     thicknesses = {layer.name: layer.thickness for layer in layers}
@@ -115,10 +113,11 @@ def build(setting: Setting, stretch: float) -> LayeredCut:
     domain = laminate(COMM, thicknesses, length=LENGTH, size=size, band=6 * size, notch=setting.notch)
     block = LayeredBlock.build(layers, domain, damping=DAMPING)
     blade = Blade(HALF_ANGLE, size, HALF_THICKNESS)
-    return LayeredCut.build(block, blade, notch=setting.notch, drawn=stretch * LENGTH)
+    fixture = Fixture(ends=("far_left", "far_right"), drawn=stretch * LENGTH)
+    return Insertion.build(block, blade, Drive(speed=1.0, entry_time=1.0), notch=setting.notch, fixture=fixture)
 
 
-def push(cut: LayeredCut, until: float, size: float, out: Path) -> Recording:
+def push(cut: Insertion, until: float, size: float, out: Path) -> Recording:
     """Insert and push the blade. Collective."""
     with Recording(
         out,
@@ -130,7 +129,7 @@ def push(cut: LayeredCut, until: float, size: float, out: Path) -> Recording:
         every=20,
     ) as recording:
         insertion = StepControl(first=0.05, largest=0.1, smallest=1e-5)
-        run(cut.mechanics, cut.insertion, insertion, recording)
+        run(cut.mechanics, cut.motion.entry_time, insertion, recording)
         run(cut.mechanics, until, StepControl(first=size / 4, largest=size, smallest=1e-5), recording)
     return recording
 
@@ -138,7 +137,7 @@ def push(cut: LayeredCut, until: float, size: float, out: Path) -> Recording:
 # ## What came out
 
 
-def summarise(cut: LayeredCut, history: History, seconds: float) -> Summary:
+def summarise(cut: Insertion, history: History, seconds: float) -> Summary:
     """Headline numbers."""
     depth, force = history["depth"], history["force"]
     summary: Summary = {
@@ -146,11 +145,11 @@ def summarise(cut: LayeredCut, history: History, seconds: float) -> Summary:
         "largest_force": float(force.max()),
         **{f"{layer.name}_fracture": float(history[f"{layer.name}_fracture"][-1]) for layer in cut_through(cut)},
         "largest_closure": float(np.abs(history["energy_closure"]).max()),
-        "largest_imbalance": float(history["imbalance"].max() / force.max()),
+        "largest_imbalance": float((history["imbalance"] * force).max() / force.max()),
         "steps": len(depth),
         "rejected_steps": float(history["cuts"].sum()),
         "newton_iterations": float(history["newton"].sum()),
-        "degrees_of_freedom": cut.block.state.V.dofmap.index_map.size_global * 2,
+        "degrees_of_freedom": cut.state.V.dofmap.index_map.size_global * 2,
         "ranks": COMM.size,
         "seconds": seconds,
     }
@@ -160,19 +159,19 @@ def summarise(cut: LayeredCut, history: History, seconds: float) -> Summary:
     return summary
 
 
-def cut_through(cut: LayeredCut) -> list[Layer]:
+def cut_through(cut: Insertion) -> list[Layer]:
     """Layers all of whose bond has broken. Collective."""
     found = []
-    for crack in cut.block.cracks:
+    for crack in cut.body.cracks:
         damage = crack.facet_mean("damage")
-        for layer in cut.block.layers_of(crack):
-            within = np.isin(crack.points.facets, cut.block.domain.facets(f"crack_{layer.name}"))
+        for layer in cut.body.layers_of(crack):
+            within = np.isin(crack.points.facets, cut.body.domain.facets(f"crack_{layer.name}"))
             if COMM.allreduce(float(damage[within].min(initial=1.0)), MPI.MIN) > 0.99:
                 found.append(layer)
     return found
 
 
-def draw(cut: LayeredCut, history: History, out: Path) -> None:
+def draw(cut: Insertion, history: History, out: Path) -> None:
     """Force, energies of the layers, audit, and the cut skin by its layers and by its stress."""
     if COMM.rank == 0:
         plot_curves(
@@ -183,9 +182,9 @@ def draw(cut: LayeredCut, history: History, out: Path) -> None:
             title="Cutting skin",
             references={"toughness of the dermis": TOUGHNESS["dermis"]},
         )
-        plot_layers(cut.block, history, out / "layer_energies.png")
+        plot_layers(cut.body, history, out / "layer_energies.png")
         plot_energy(out / "energy.png", history, x="time", xlabel="way of the blade [mm]")
-    block, space = cut.block, fem.functionspace(cut.block.state.mesh, ("DG", 0))
+    block, space = cut.body, fem.functionspace(cut.body.state.mesh, ("DG", 0))
     number, stress = fem.Function(space), fem.Function(space)
     for i, solid in enumerate(block.solids, start=1):
         deviator = ufl.dev(solid.cauchy_stress(block.state.u))
@@ -202,7 +201,7 @@ def draw(cut: LayeredCut, history: History, out: Path) -> None:
             grid,
             field,
             label=label,
-            tool=prism(cut.blade.outline(1.0 - tip[1]), tip, axes),
+            tool=prism(cut.tool.outline(1.0 - tip[1]), tip, axes),
             window=(-0.9, 0.9, tip[1] - 0.3, 0.3, 0.0, 0.0),
             limits=(0.0, len(block.layers)) if field == "layer" else None,
         )
@@ -225,7 +224,7 @@ def plot_layers(block: LayeredBlock, history: History, path: Path) -> None:
     figure.savefig(path, dpi=150)
 
 
-def check(cut: LayeredCut, summary: Summary, history: History) -> None:
+def check(cut: Insertion, summary: Summary, history: History) -> None:
     """The force in the dermis, once there is a stretch of it, and the books."""
     depth, force = history["depth"], history["force"]
     steady = (depth > 0.75) & (depth < 0.95)
@@ -239,11 +238,12 @@ def check(cut: LayeredCut, summary: Summary, history: History) -> None:
     assert summary["largest_imbalance"] < 1e-6
 
 
-def notched(cut: LayeredCut, layer: Layer) -> float:
+def notched(cut: Insertion, layer: Layer) -> float:
     """How far the notch reaches into a layer [mm]."""
-    layers = cut.block.layers
+    layers = cut.body.layers
     top = sum(other.thickness for other in layers[: layers.index(layer)])
-    return float(np.clip(cut.tip / TIP_IN_NOTCH - top, 0.0, layer.thickness))
+    notch = cut.frame.span(cut.state.mesh, cut.body.mouth, cut.frame.push)[1]
+    return float(np.clip(notch - top, 0.0, layer.thickness))
 
 
 if __name__ == "__main__":

@@ -38,11 +38,10 @@ import numpy as np
 import typer
 from mpi4py import MPI
 
-from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
+from cutsim import Blade, Drive, Exponential, Insertion, NeoHookean, StepControl, cracked_block, read_geo, run
 from cutsim.results.output import claim_folder, write_summary
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Recording
-from cutsim.studies.insertion import Insertion
 from cutsim.studies.insertion_work import SteadyCut, TwoInsertions, steady_force
 
 MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
@@ -56,6 +55,7 @@ SILICONE, VISCOSITY = NeoHookean(0.777, 0.45), 2e-4  # MPa, MPa s at 1 mm/s
 BOND = Exponential.from_parameters(strength=0.3, toughness=0.1)  # MPa, N/mm
 STEADY = (2.0, 4.0)  # depths of the tip between which the cut is steady [mm]
 STEP = 0.05  # way of the tool in a step, at most [mm]
+SPEED, ENTRY_TIME = 1.0, 1.0  # of the push [mm/s]; in which the halves of the blade are spread in the notch [s]
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Strip:
         E, nu = SILICONE.young, SILICONE.poisson
         return 2 * HALF * self.width * (E if self.dim == 3 else E / (1 - nu**2))
 
-    def build(self, turn: float | None) -> Insertion:
+    def build(self, turning_depth: float | None) -> Insertion:
         """Strip and blade; a half of the strip in space, where its middle plane is one of symmetry. Collective."""
         sizes = {"dim": self.dim, "Lx": HALF, "H": HEIGHT, "lc": self.size, "band": 0.3, "growth": 1.6, "notch": NOTCH}
         if self.dim == 3:
@@ -95,7 +95,8 @@ class Strip:
         forward, lateral = (0.0, -1.0, 0.0)[: self.dim], (1.0, 0.0, 0.0)[: self.dim]
         blade = Blade(np.radians(20), max(0.1, self.size), 0.5, forward, lateral)
         domain = read_geo(MESH, MPI.COMM_WORLD, sizes, gdim=self.dim)
-        return Insertion.build(domain, SILICONE, BOND, blade, notch=NOTCH, viscosity=VISCOSITY, turn=turn)
+        body = cracked_block(domain, SILICONE, BOND, viscosity=VISCOSITY)
+        return Insertion.build(body, blade, Drive(SPEED, ENTRY_TIME, turning_depth), notch=NOTCH)
 
 
 # ## Settings

@@ -9,9 +9,8 @@ from ffcx.codegeneration import jit
 from mpi4py import MPI
 from ufl import SpatialCoordinate
 
-from cutsim import Blade, Exponential, NeoHookean, StepControl, read_geo, run
+from cutsim import Blade, Drive, Exponential, Insertion, NeoHookean, StepControl, cracked_block, read_geo, run
 from cutsim.interface.cohesive import separation_curve
-from cutsim.studies.insertion import Insertion
 from cutsim.studies.insertion_work import SteadyCut, TwoInsertions, audited_toughness, steady_force
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
@@ -23,8 +22,8 @@ def build(comm=MPI.COMM_WORLD, *, friction=0.0, viscosity=0.002, young=0.777, to
     law = Exponential.from_parameters(strength=0.6, toughness=toughness)
     blade = Blade(np.radians(12), block["lc"], 0.855)
     domain = read_geo(MESH, comm, block, gdim=2)
-    material = NeoHookean(young, 0.45)
-    return Insertion.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=viscosity)
+    body = cracked_block(domain, NeoHookean(young, 0.45), law, viscosity=viscosity)
+    return Insertion.build(body, blade, Drive(1.0, 1.0), notch=0.5, friction=friction)
 
 
 def push(cut, depth, control, number=1):
@@ -48,7 +47,8 @@ def strip(size, dim=2, until=3.6, friction=0.0, turn=None):
     blade = Blade(np.radians(20), max(0.1, size), 0.5, forward, lateral)
     law = Exponential.from_parameters(strength=0.3, toughness=TOUGHNESS)
     domain, silicone = read_geo(MESH, MPI.COMM_WORLD, sizes, gdim=dim), NeoHookean(0.777, 0.45)
-    cut = Insertion.build(domain, silicone, law, blade, notch=0.5, friction=friction, viscosity=2e-4, turn=turn)
+    body = cracked_block(domain, silicone, law, viscosity=2e-4)
+    cut = Insertion.build(body, blade, Drive(1.0, 1.0, turn), notch=0.5, friction=friction)
     rows = push(cut, turn or until, StepControl(first=0.02, largest=0.05))
     if turn is not None:
         again = push(cut, turn, StepControl(first=0.05, largest=0.2), 2)
@@ -102,15 +102,15 @@ def test_the_books_give_back_what_was_put_in():
     """Of any stretch, steady or not: a check of the audit, not of the cut."""
     cut, history = steady(0.1, 2)
     for start, end in ((1.0, 1.5), (2.0, 3.6)):
-        assert audited_toughness(history, start, end, cut.whole) == pytest.approx(TOUGHNESS, rel=0.01)
+        assert audited_toughness(history, start, end, cut.symmetry_factor) == pytest.approx(TOUGHNESS, rel=0.01)
     with pytest.raises(ValueError, match=r"depths = .* such that the cut grows"):
-        audited_toughness(history, 3.0, 3.0, cut.whole)
+        audited_toughness(history, 3.0, 3.0, cut.symmetry_factor)
 
 
 def test_the_front_is_placed_within_the_facets():
     """The area where a linear function is above a level, in the plane and on rectangles in space, and of a jump."""
     for dim in (2, 3):
-        points = steady(0.2, dim)[0].crack.points
+        points = steady(0.2, dim)[0].body.cracks[0].points
         y = points.evaluator({"y": SpatialCoordinate(steady(0.2, dim)[0].state.mesh)[1]})()["y"]
         for level in np.linspace(-4.0, -2.0, 7):
             assert points.area_above(y, level) == pytest.approx((-0.5 - level) * (1.0 if dim == 2 else 0.5), abs=0.01)
@@ -172,9 +172,10 @@ def test_parameters_are_refused_by_name():
     law = Exponential.from_parameters(strength=0.6, toughness=0.2)
     domain = read_geo(MESH, MPI.COMM_WORLD, {"dim": 2, "lc": 0.5}, gdim=2)
     blade = Blade(0.2, 0.05, 0.855)
-    for wrong in ({"notch": 0.01}, {"notch": 0.5, "friction": -0.1}, {"notch": 0.5, "insertion": 0.0}):
+    body = cracked_block(domain, NeoHookean(0.777, 0.45), law)
+    for wrong in ({"notch": 0.01}, {"notch": 0.5, "friction": -0.1}):
         with pytest.raises(ValueError, match=f"{list(wrong)[-1]} = "):
-            Insertion.build(domain, NeoHookean(0.777, 0.45), law, blade, **wrong)
+            Insertion.build(body, blade, Drive(1.0), **wrong)
     cut = build(lc=0.25, H=3.0)
     with pytest.raises(ValueError, match=r"depth = 0\.1"):
         cut.time_of(0.1)
@@ -183,9 +184,9 @@ def test_parameters_are_refused_by_name():
 @pytest.mark.parametrize(
     ("block", "tool", "options", "message"),
     [
-        ({}, {}, {"notch": 1.5}, r"notch = 1.5 .* 0.5, the depth of the group 'notch'"),
+        ({}, {}, {"notch": 1.5}, r"notch = 1.5 .* 0.5, the depth of the notch in the mesh"),
         ({}, {"half_angle": 1.5}, {}, r"tool.half_angle = 1.5 .* in radians"),
-        ({"H": 2.0}, {}, {"depth": 2.5}, r"depth = 2.5 .*the height of the block = 2"),
+        ({"H": 2.0}, {}, {"depth": 2.5}, r"depth = 2.5 .*the height of the body = 2"),
         ({}, {"push": (0.0, -1.0, 0.0), "lateral": (1.0, 0.0, 0.0)}, {}, r"tool.push = .* of 2 components"),
     ],
     ids=["another notch", "degrees", "deeper than the block", "of another dimension"],
@@ -196,24 +197,34 @@ def test_what_does_not_fit_is_refused(block, tool, options, message):
     law = Exponential.from_parameters(strength=0.6, toughness=TOUGHNESS)
     domain = read_geo(MESH, MPI.COMM_SELF, block, gdim=2)
     with pytest.raises(ValueError, match=message):
-        Insertion.build(domain, NeoHookean(0.8, 0.45), law, tool, notch=options.get("notch", 0.5)).time_of(
-            options.get("depth", 1.0)
-        )
+        body = cracked_block(domain, NeoHookean(0.8, 0.45), law)
+        cut = Insertion.build(body, tool, Drive(1.0), notch=options.get("notch", 0.5))
+        cut.time_of(options.get("depth", 1.0))
 
 
-def test_a_push_has_no_end_in_any_unit():
-    """The same cut in µm and kPa: the tool arrives where it is pushed to, and the curve is the same."""
-    curves = []
-    for length in (1.0, 1e3):
-        block = {"dim": 2, "Lx": 2, "H": 3, "lc": 0.1, "band": 0.3, "growth": 1.4, "notch": 0.5}
-        scaled = {
-            name: value * (length if name in ("Lx", "H", "lc", "band", "notch") else 1) for name, value in block.items()
-        }
-        domain = read_geo(MESH, MPI.COMM_SELF, scaled, gdim=2)
-        law = Exponential.from_parameters(strength=0.6, toughness=0.2 * length)
-        tool = Blade(0.2, 0.1 * length, 0.3 * length)
-        cut = Insertion.build(domain, NeoHookean(0.777, 0.45), law, tool, notch=0.5 * length, insertion=length)
-        rows = push(cut, 0.9 * length, StepControl(0.1 * length, 0.1 * length))
-        assert rows["depth"][-1] == pytest.approx(0.9 * length)
-        curves.append(rows["force"] / length)
-    np.testing.assert_allclose(curves[1], curves[0], rtol=1e-6, atol=1e-9)
+UNITS = {"mm and MPa": (1.0, 1.0), "SI": (1e-3, 1e6), "µm and MPa": (1e3, 1.0)}
+
+
+@cache
+def cut_in(units):
+    """Depth and force of a viscous cut with a turn, both in mm and N/mm, in other units of length and stress."""
+    length, stress = UNITS[units]
+    scales = {"Lx": length, "H": length, "lc": length, "band": length, "notch": length}
+    block = {"dim": 2, "Lx": 2, "H": 3, "lc": 0.1, "band": 0.3, "growth": 1.4, "notch": 0.5}
+    scaled = {name: value * scales.get(name, 1) for name, value in block.items()}
+    domain = read_geo(MESH, MPI.COMM_SELF, scaled, gdim=2)
+    law = Exponential.from_parameters(strength=0.6 * stress, toughness=0.2 * stress * length)
+    body = cracked_block(domain, NeoHookean(0.777 * stress, 0.45), law, viscosity=2e-3 * stress)
+    tool, drive = Blade(0.2, 0.1 * length, 0.3 * length), Drive(speed=2.0 * length, turning_depth=0.6 * length)
+    cut = Insertion.build(body, tool, drive, notch=0.5 * length)
+    assert cut.motion.entry_time == pytest.approx(0.2)
+    rows = push(cut, 0.5 * length, StepControl(0.025, 0.025), 2)
+    return rows["time"], rows["depth"] / length, rows["force"] / (stress * length)
+
+
+@pytest.mark.parametrize("units", ["SI", "µm and MPa"])
+def test_a_cut_is_the_same_in_all_units(units):
+    """One value changes for each quantity, time none: nothing has a size of its own."""
+    for found, expected in zip(cut_in(units), cut_in("mm and MPa"), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+    assert cut_in("mm and MPa")[1][-1] == pytest.approx(0.5)

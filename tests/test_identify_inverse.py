@@ -9,10 +9,20 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim import Blade, Exponential, NeoHookean, StepControl, StepError, read_geo, run
+from cutsim import (
+    Blade,
+    Drive,
+    Exponential,
+    Insertion,
+    NeoHookean,
+    StepControl,
+    StepError,
+    cracked_block,
+    read_geo,
+    run,
+)
 from cutsim.identify import fit_simulation
 from cutsim.identify.inverse import Evaluations
-from cutsim.studies.insertion import Insertion
 
 MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
 TRUE = {"stiffness": 2.0, "decay": 0.5}
@@ -165,15 +175,8 @@ def block():
 def blade_cut(values):
     """Force per width against depth."""
     law = Exponential.from_parameters(strength=0.4, toughness=values["toughness"])
-    cut = Insertion.build(
-        block(),
-        NeoHookean(0.777, 0.45),
-        law,
-        Blade(0.2, 0.15, 0.855),
-        notch=0.6,
-        friction=values["friction"],
-        viscosity=0.002,
-    )
+    body = cracked_block(block(), NeoHookean(0.777, 0.45), law, viscosity=0.002)
+    cut = Insertion.build(body, Blade(0.2, 0.15, 0.855), Drive(1.0, 1.0), notch=0.6, friction=values["friction"])
     rows = []
     run(
         cut.mechanics,

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim import Blade, Exponential, Needle, NeoHookean, StepControl, read_geo, run
-from cutsim.studies.insertion import Insertion
+from cutsim import Blade, Drive, Exponential, Insertion, Needle, NeoHookean, StepControl, cracked_block, read_geo, run
 from cutsim.studies.insertion_work import TwoInsertions, audited_toughness, force_parts
 from cutsim.tools.tool_parts import PARTS
 
@@ -25,8 +24,8 @@ def thread(comm=MPI.COMM_WORLD, *, friction=0.0, turn=None, **sizes):
     domain = read_geo(MESHES / "thread.geo", comm, ROUND | sizes, gdim=2)
     needle = Needle(np.radians(30), 0.15, RADIUS)
     law = Exponential.from_parameters(strength=1.0, toughness=TOUGHNESS)
-    material = NeoHookean(YOUNG, POISSON)
-    return Insertion.build(domain, material, law, needle, notch=0.5, friction=friction, viscosity=0.002, turn=turn)
+    body = cracked_block(domain, NeoHookean(YOUNG, POISSON), law, viscosity=0.002, axisymmetric=True)
+    return Insertion.build(body, needle, Drive(1.0, 1.0, turn), notch=0.5, friction=friction)
 
 
 def planar(comm=MPI.COMM_WORLD, **sizes):
@@ -34,7 +33,8 @@ def planar(comm=MPI.COMM_WORLD, **sizes):
     domain = read_geo(MESHES / "needle.geo", comm, BLOCK | sizes, gdim=3)
     needle = Needle(np.radians(25), 0.4, 1.0, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
     law = Exponential.from_parameters(strength=0.3, toughness=0.15)
-    return Insertion.build(domain, NeoHookean(YOUNG, 0.45), law, needle, notch=1.0, viscosity=0.002)
+    body = cracked_block(domain, NeoHookean(YOUNG, 0.45), law, viscosity=0.002)
+    return Insertion.build(body, needle, Drive(1.0, 1.0), notch=1.0)
 
 
 def split(*, friction=0.0, turn=None):
@@ -42,8 +42,8 @@ def split(*, friction=0.0, turn=None):
     domain = read_geo(MESHES / "block.geo", MPI.COMM_WORLD, SPLIT, gdim=2)
     law = Exponential.from_parameters(strength=0.6, toughness=0.2)
     blade = Blade(np.radians(20), 0.1, 0.6)
-    material = NeoHookean(YOUNG, 0.45)
-    return Insertion.build(domain, material, law, blade, notch=0.5, friction=friction, viscosity=5e-4, turn=turn)
+    body = cracked_block(domain, NeoHookean(YOUNG, 0.45), law, viscosity=5e-4)
+    return Insertion.build(body, blade, Drive(1.0, 1.0, turn), notch=0.5, friction=friction)
 
 
 def drive(cut, until, control):
@@ -154,9 +154,11 @@ def test_two_insertions_differ_by_the_new_surface(twice, toughness, friction):
     assert np.abs(history["energy_closure"]).max() < 0.015
     assert np.diff(history["energy_friction"]).min() >= 0
     assert np.diff(history["cut"]).min() >= -1e-12 * history["cut"].max(), "a cut that closes again is not healed"
-    turned = np.interp(cut.time_of(cut.turn), history["time"], history["cut"])
-    assert history["cut"][-1] == pytest.approx(turned, rel=0.02) and turned > 0.5 * (cut.turn - cut.tip)
-    broken = np.interp(cut.time_of(cut.turn), history["time"], history["energy_fracture"])
+    turned = np.interp(cut.time_of(cut.motion.turning_depth), history["time"], history["cut"])
+    assert history["cut"][-1] == pytest.approx(turned, rel=0.02) and turned > 0.5 * (
+        cut.motion.turning_depth - cut.motion.start_depth
+    )
+    broken = np.interp(cut.time_of(cut.motion.turning_depth), history["time"], history["energy_fracture"])
     assert history["energy_fracture"][-1] == pytest.approx(broken, rel=0.02), "the second time hardly anything breaks"
 
 
@@ -169,8 +171,8 @@ def test_friction_of_the_tip_adds_to_the_apparent_toughness():
 
 def test_a_planar_crack_keeps_its_books():
     cut, history = in_space()
-    pushed = history["depth"] > cut.tip
-    assert audited_toughness(history, 1.2, 1.8, cut.whole) == pytest.approx(0.15, rel=0.05)
+    pushed = history["depth"] > cut.motion.start_depth
+    assert audited_toughness(history, 1.2, 1.8, cut.symmetry_factor) == pytest.approx(0.15, rel=0.05)
     sides = history["needle_right_force_x"] + history["needle_left_force_x"]
     assert np.abs(sides).max() < 1e-4 * history["force"].max()
     assert np.abs(history["energy_closure"][pushed]).max() < 0.01
@@ -180,8 +182,8 @@ def test_a_planar_crack_keeps_its_books():
 @pytest.mark.parametrize("turn", [None, 1.0])
 def test_the_tool_is_where_it_should_be(turn):
     cut = thread(turn=turn, lc=0.15, H=3.0)
-    path = cut.halves[0].path.position
-    assert path(0.0)[1] == 0 and path(cut.insertion)[1] == pytest.approx(-cut.tip)
+    path = cut.contacts[0].path.position
+    assert path(0.0)[1] == 0 and path(cut.motion.entry_time)[1] == pytest.approx(-cut.motion.start_depth)
     assert path(cut.time_of(0.9))[1] == pytest.approx(-0.9)
     with pytest.raises(ValueError, match=r"depth = 0\.1 is not allowed"):
         cut.time_of(0.1)
@@ -196,10 +198,10 @@ def test_the_tool_is_where_it_should_be(turn):
 
 def test_groups_of_the_meshes_have_their_areas():
     cut, whole = thread(lc=0.2), planar(lc=0.45)
-    areas = [c.points.integral(np.ones_like(c.points.weights)) for c in (cut.crack, whole.crack)]
+    areas = [c.points.integral(np.ones_like(c.points.weights)) for c in (*cut.body.cracks, *whole.body.cracks)]
     assert areas[0] == pytest.approx(2 * np.pi * THREAD * (ROUND["H"] - ROUND["notch"]))
     assert areas[1] == pytest.approx(BLOCK["H"] * BLOCK["B"] - BLOCK["notch"] * BLOCK["slit"])
-    mouth = cut.halves[0].patches[2].surface.points
+    mouth = cut.contacts[0].patches[2].surface.points
     cone = np.pi * (2 * THREAD + 0.1) * np.hypot(0.1, ROUND["notch"])
     assert mouth.integral(np.ones_like(mouth.weights)) == pytest.approx(cone)
     for name, sizes, wrong in (("thread", ROUND, "notch"), ("thread", ROUND, "r0"), ("needle", BLOCK, "slit")):
@@ -208,7 +210,7 @@ def test_groups_of_the_meshes_have_their_areas():
 
 
 def test_halves_start_beside_the_plane_of_symmetry():
-    for half, side in zip(split().halves, (1, -1), strict=True):
+    for half, side in zip(split().contacts, (1, -1), strict=True):
         start = half.path.position(0.0)
         assert side * start[0] < 0 and start[1] == pytest.approx(-0.4)
         assert half.shape.side == side
@@ -257,19 +259,23 @@ def test_every_number_of_ranks_gives_the_same_history(build):
 
 def test_parameters_are_refused_by_name():
     domain = read_geo(MESHES / "thread.geo", MPI.COMM_WORLD, ROUND | {"lc": 0.25}, gdim=2)
-    law = Exponential.from_parameters(strength=0.6, toughness=0.2)
-    needle = Needle(0.5, 0.15, RADIUS)
-    wrong = {"notch": 0.1, "friction": -0.1, "insertion": 0.0, "turn": 0.3}
-    for name, value in wrong.items():
-        with pytest.raises(ValueError, match=f"{name} = {value}"):
-            Insertion.build(domain, NeoHookean(YOUNG, POISSON), law, needle, **({"notch": 0.5} | {name: value}))
+    law, needle, drive = Exponential.from_parameters(strength=0.6, toughness=0.2), Needle(0.5, 0.15, RADIUS), Drive(1.0)
+    body = cracked_block(domain, NeoHookean(YOUNG, POISSON), law, axisymmetric=True)
+    for wrong in ({"notch": 0.1}, {"notch": 0.5, "friction": -0.1}):
+        with pytest.raises(ValueError, match="{} = {}".format(*list(wrong.items())[-1])):
+            Insertion.build(body, needle, drive, **wrong)
+    for wrong in ({"speed": 0.0}, {"entry_time": 0.0}, {"turning_depth": 0.3}):
+        with pytest.raises(ValueError, match="{} = {}".format(*next(iter(wrong.items())))):
+            Insertion.build(body, needle, Drive(**{"speed": 1.0} | wrong), notch=0.5)
     for wrong_tool, name in (
         (Needle(0.5, 0.15, RADIUS, (1.0, 0.0)), "tool.push"),
-        (Blade(0.5, 0.1, 0.5, side=1), "tool.side"),
+        (Needle(0.5, 0.15, RADIUS, (0.0, 1.0)), "tool.push"),
+        (Needle(0.5, 0.15, RADIUS, lateral=(1.0, 0.0), side=1), "tool.side"),
+        (Blade(0.5, 0.1, 0.5), "tool = Blade"),
     ):
         with pytest.raises(ValueError, match=name):
-            Insertion.build(domain, NeoHookean(YOUNG, POISSON), law, wrong_tool, notch=0.5)
-    with pytest.raises(ValueError, match="turn = None is not allowed"):
+            Insertion.build(body, wrong_tool, drive, notch=0.5)
+    with pytest.raises(ValueError, match="turning_depth = None is not allowed"):
         TwoInsertions.of({}, thread(lc=0.25))
     cut, history = blade_twice(0.0)
     half = {name: column[:-5] for name, column in history.items()}

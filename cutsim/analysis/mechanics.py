@@ -284,8 +284,8 @@ class Mechanics:
         )
 
     def reaction(self, support: Support) -> float:
-        """Reaction of a support along its component in the trial state [force]. Collective."""
-        return self._constraints.reaction(support, self._residual)
+        """Reaction of a support along its direction in the trial state [force]. Collective."""
+        return support.sign * self._constraints.reaction(support, self._residual)
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity). Collective."""
@@ -294,7 +294,7 @@ class Mechanics:
             columns |= term.record()
         for support in self.supports:
             if support.name:
-                columns[f"{support.name}_displacement"] = (support.prescribed, "length")
+                columns[f"{support.name}_displacement"] = (support.displacement, "length")
                 columns[f"{support.name}_force"] = (self.reaction(support), "force")
         return columns | self._trial_audit.record()
 

@@ -1,6 +1,7 @@
 """Supports, dead loads and pressure."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 import ufl
@@ -8,7 +9,7 @@ from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import global_dot, nodal_forces, resultant
-from cutsim.base.checks import require, require_numbers
+from cutsim.base.checks import count, require, require_number, require_numbers
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr, cofactor
 from cutsim.base.parameters import History, Schedule
@@ -17,9 +18,12 @@ from cutsim.base.terms import Term
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.state import State
 
+# component of a direction over its length that is none
+_STRAIGHT = 1e-12
+
 
 class Support:
-    """Prescribed displacement of one component on some facets (or vertices), with its reaction.
+    """Prescribed displacement along one direction on some facets (or vertices), with its reaction.
 
     On a crack it holds all its sides. Several supports may hold the same node along the same component if they agree on
     its displacement at all times; its reaction then counts for the first of them that has a name.
@@ -27,7 +31,8 @@ class Support:
     Args:
         state: Displacement and time.
         entities: Local mesh entities.
-        component: Index of the displacement component.
+        component: Index of the displacement component, or the direction along which the displacement is prescribed and
+            the reaction counted; its length does not matter.
         value: Displacement, a number or a function of time [length].
         name: Name in the history, None to leave the reaction out of it.
         dim: Dimension of the entities; facets by default.
@@ -36,9 +41,10 @@ class Support:
     Attributes:
         dofs: Owned dofs that it holds.
         symbol: The component in words, such as "u_x".
+        sign: −1 if the direction is against the component, else 1.
 
     Raises:
-        ValueError: The component does not exist, or no entity is found on any rank.
+        ValueError: The component does not exist, the direction is along no axis, or no entity is found on any rank.
     """
 
     @checked
@@ -46,7 +52,7 @@ class Support:
         self,
         state: State,
         entities: NDArray[np.int32],
-        component: int,
+        component: int | tuple[float, ...],
         value: float | History = 0.0,
         *,
         name: str | None = None,
@@ -55,13 +61,13 @@ class Support:
     ) -> None:
         gdim = state.mesh.geometry.dim
         require_numbers("corners", corners, least=0)
-        require("component", component, component in range(gdim), f"0 … {gdim - 1}")
+        component, self.sign = _axis(component, gdim)
         tdim = state.mesh.topology.dim
         require("dim", dim, dim is None or dim in range(tdim + 1), f"0 … {tdim}, or None for facets")
         dim = tdim - 1 if dim is None else dim
         self.name, self.state, self.component, self.corners = name, state, component, corners
         self.symbol = f"u_{'xyz'[component]}"
-        self._value = Schedule(state.mesh, value, "value")
+        self._value = Schedule(state.mesh, value if self.sign > 0 else _opposite(value), "value")
         dofs = gdim * locate_dofs(state.V, dim, entities) + component
         owned = len(state.increment)
         self.dofs = dofs[dofs < owned]
@@ -71,16 +77,40 @@ class Support:
 
     @property
     def prescribed(self) -> float:
-        """Prescribed displacement at the end of the step [length]."""
+        """Prescribed displacement component at the end of the step [length]."""
         return self._value.value
+
+    @property
+    def displacement(self) -> float:
+        """Prescribed displacement along the direction at the end of the step [length]."""
+        return self.sign * self.prescribed
 
     def begin(self, time: float) -> None:
         """Set the displacement to its value at a time."""
         self._value.begin(time)
 
     def rates(self, start: float, end: float) -> tuple[float, float]:
-        """Prescribed velocity and acceleration at the start of a span of time without a corner."""
+        """Prescribed velocity and acceleration of the component at the start of a span of time without a corner."""
         return self._value.rates(start, end)
+
+
+def _axis(component: int | tuple[float, ...], gdim: int) -> tuple[int, int]:
+    """A component or a direction as a component and a sign."""
+    if not isinstance(component, Sequence | np.ndarray):
+        require_number("component", component, count())
+        require("component", component, component in range(gdim), f"0 … {gdim - 1}")
+        return int(component), 1
+    require_numbers("component", component, length=gdim)
+    axis = int(np.argmax(np.abs(component)))
+    rest = np.linalg.norm(np.delete(component, axis))
+    require("component", component, rest <= _STRAIGHT * abs(component[axis]), "a direction along an axis")
+    return axis, 1 if component[axis] > 0 else -1
+
+
+def _opposite(value: float | History) -> float | History:
+    if callable(value):
+        return lambda time: -value(time)
+    return -value if isinstance(value, int | float) else value  # what is no number is refused later
 
 
 class Load(Term, ABC):

@@ -70,6 +70,7 @@ class Crack(Term):
         normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
 
     Attributes:
+        young: Young's modulus of the softer neighbour [stress].
         points: Its integration points, with the facets in the order of all per-facet arrays.
         history: What they remember.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
@@ -98,7 +99,7 @@ class Crack(Term):
     ) -> None:
         require_number("young", young, positive)
         require_number("penetration", penetration, positive.or_none)
-        self.name, self.state, self.law = name, state, law
+        self.name, self.state, self.law, self.young = name, state, law, young
         self._current = normal == "current"
         self._allowed_penetration = penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 History = Mapping[str, Array]
 
 
-def audited_toughness(history: History, start: float, end: float, whole: float) -> float:
+def audited_toughness(history: History, start: float, end: float, symmetry_factor: float) -> float:
     """What the energy audit leaves for the crack, (∫F ds − ΔE − losses)/ΔA: a check of the books [force/length].
 
     ΔE is what body and contact hold, losses are friction and viscosity, and ΔA, the growth of the column `cut`, counts
@@ -29,13 +29,13 @@ def audited_toughness(history: History, start: float, end: float, whole: float) 
         history: Columns of a run of `Insertion`.
         start: Depth at which the balance begins [length].
         end: Depth at which it ends [length].
-        whole: Factor from the meshed part to the whole block.
+        symmetry_factor: Factor from what is meshed to the whole body.
 
     Raises:
         ValueError: The cut does not grow between the two depths.
     """
     held = ("strain", "contact", "friction", "viscous")
-    spent = whole * (history["work_external"] - sum(history[f"energy_{name}"] for name in held))
+    spent = symmetry_factor * (history["work_external"] - sum(history[f"energy_{name}"] for name in held))
     pushed = _first_push(history["depth"])
 
     def grown(column: Array) -> float:
@@ -117,7 +117,7 @@ class SteadyCut:
         return cls(force, float(second - first) / force, end - start, swept)
 
 
-def force_parts(history: History, whole: float, window: float) -> dict[str, Array]:
+def force_parts(history: History, symmetry_factor: float, window: float) -> dict[str, Array]:
     """The force of the first push by what its work is spent on, in means over windows of the depth.
 
     Between two depths ∫F ds is what body and contact take up, what the crack takes up and dissipates, friction on tip
@@ -125,7 +125,7 @@ def force_parts(history: History, whole: float, window: float) -> dict[str, Arra
 
     Args:
         history: Columns of a run of `Insertion`.
-        whole: Factor from the meshed part to the whole block.
+        symmetry_factor: Factor from what is meshed to the whole body.
         window: Length of the windows > 0 [length].
 
     Returns:
@@ -145,7 +145,7 @@ def force_parts(history: History, whole: float, window: float) -> dict[str, Arra
         return np.diff(np.interp(ends, depth, work)) / window
 
     def energy(*names: str) -> Array:
-        return rate(whole * np.sum([history[f"energy_{name}"][pushed] for name in names], axis=0))
+        return rate(symmetry_factor * np.sum([history[f"energy_{name}"][pushed] for name in names], axis=0))
 
     return {
         "depth": 0.5 * (ends[1:] + ends[:-1]),
@@ -199,25 +199,29 @@ class TwoInsertions:
 
         Args:
             history: Its columns.
-            cut: The insertion, with a `turn`.
+            cut: The insertion, with a turning depth.
 
         Raises:
             ValueError: The tool does not turn, or the run ended before the second push did.
         """
-        require("turn", cut.turn, cut.turn is not None, "a depth: the tool is to be pushed twice")
-        turn = cut.turn or cut.tip
-        ends = [0.0, *(cut.time_of(depth, push) for push, depth in ((1, turn), (2, cut.tip), (2, turn)))]
+        motion, whole = cut.motion, cut.symmetry_factor
+        turn = motion.turning_depth
+        require("turning_depth", turn, turn is not None, "a depth: the tool is to be pushed twice")
+        assert turn is not None
+        pushes = [(turn, 1), (motion.start_depth, 2), (turn, 2)]
+        ends = [0.0, *(cut.time_of(depth, push) for depth, push in pushes)]
         time = history["time"]
         require("time", float(time[-1]), time[-1] >= ends[-1] * (1 - 1e-9), f">= {ends[-1]}, when the second push ends")
         time = np.append(0.0, time)
         lost = history["energy_friction"] + history["energy_viscous"]
         works, losses = (
-            cut.whole * np.diff(np.interp(ends, time, np.append(0.0, column)))[::2]
+            whole * np.diff(np.interp(ends, time, np.append(0.0, column)))[::2]
             for column in (history["work_external"], lost)
         )
         held = np.append(0.0, history["energy_strain"] + history["energy_contact"])
-        second = float(works[1]) + cut.whole * float(np.interp(ends[2], time, held))
-        area = cut.whole * float(np.interp(ends[1], history["time"], history["crack_broken"]))
+        second = float(works[1]) + whole * float(np.interp(ends[2], time, held))
+        broken = np.sum([history[f"{crack.name}_broken"] for crack in cut.body.cracks], axis=0)
+        area = whole * float(np.interp(ends[1], history["time"], broken))
         return cls(float(works[0]), second, float(losses[0] - losses[1]), area)
 
 

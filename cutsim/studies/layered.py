@@ -1,23 +1,24 @@
 """A block of layers with one crack through all of them, such as skin (docs/skin_layers.md)."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import groupby
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
-from cutsim.base.checks import nonnegative, positive, require, require_number
+from cutsim.base.checks import count, nonnegative, positive, require, require_number, require_numbers
 from cutsim.base.signatures import checked
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh
-from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.crack import Crack
 from cutsim.materials.elastic import Material
 from cutsim.materials.library import SKIN, material
 from cutsim.results.recording import Columns
+from cutsim.studies.body import CrackedBody, cracked_state
 
 # the '+' face of the crack is that of the half x > 0, whose normal points to −x
 _PLUS = (-1.0, 0.0, 0.0)
@@ -33,6 +34,7 @@ class Layer:
         thickness: Thickness > 0 [length].
         material: Strain energy.
         law: Cohesive law of the crack in it.
+        solid: Further arguments of its `Solid`, such as ``{"density": 1.1e-9}``.
 
     Raises:
         ValueError: The thickness is not positive.
@@ -42,6 +44,7 @@ class Layer:
     thickness: float
     material: Material
     law: CohesiveLaw
+    solid: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         require_number("thickness", self.thickness, positive)
@@ -66,86 +69,84 @@ def skin(epidermis: CohesiveLaw, dermis: CohesiveLaw, hypodermis: CohesiveLaw) -
 
 
 @dataclass(frozen=True)
-class LayeredBlock:
+class LayeredBlock(CrackedBody):
     """Layers that stick together, each a solid of its own, with one crack through all of them.
+
+    Each solid has the name of its layer.  Neighbours with the same law share a part of the crack, which is called
+    "crack" if it is the only one, else "crack_" and the name of its first layer.
 
     Attributes:
         layers: The layers from the top downwards.
-        domain: The tagged mesh.
-        state: Displacement and time.
-        solids: A solid for each layer, of the same name.
-        cracks: The crack, in a part for each law: neighbours with the same law share one, which is called "crack" if it
-            is the only one, else "crack_" and the name of its first layer.
-        notch: Faces of the notch, which touch and do not stick; None without a notch.
     """
 
     layers: tuple[Layer, ...]
-    domain: TaggedMesh
-    state: State
-    solids: tuple[Solid, ...]
-    cracks: tuple[Crack, ...]
-    notch: Crack | None
 
     @classmethod
     @checked
-    def build(cls, layers: Sequence[Layer], domain: TaggedMesh, *, damping: float = 0.0) -> Self:
+    def build(
+        cls,
+        layers: Sequence[Layer],
+        domain: TaggedMesh,
+        *,
+        damping: float = 0.0,
+        axisymmetric: bool = False,
+        degree: int = 1,
+        plus: Sequence[float] | None = None,
+    ) -> Self:
         """Put solids and cracks on a mesh. Collective.
 
         Args:
             layers: The layers from the top downwards.
             domain: Mesh with the groups of `cutsim.fields.laminate`.
             damping: Kelvin–Voigt viscosity over Young's modulus of every layer [time].
+            axisymmetric: Whether the mesh is the meridian plane of a body of revolution.
+            degree: Degree of the displacement.
+            plus: Direction that points out of the '+' half of the block into the other one; −x by default.
 
         Raises:
             ValueError: A parameter is outside its range, or the mesh lacks a layer.
         """
         require("layers", len(layers), len(layers) > 0, "at least one layer")
         require_number("damping", damping, nonnegative)
-        mesh, cells = domain.mesh, [domain.cells(layer.name) for layer in layers]
-        notched = "notch" in domain.names
-        broken = [domain.facets("notch")] if notched else []
-        parts, plus = _parts(layers, domain), _PLUS[: mesh.geometry.dim]
+        require_number("degree", degree, count(1))
+        gdim = domain.mesh.geometry.dim
+        towards = _PLUS[:gdim] if plus is None else tuple(plus)
+        require_numbers("plus", towards, length=gdim)
+        cells = [domain.cells(layer.name) for layer in layers]
+        parts = _parts(layers, domain)
         facets = [np.concatenate([domain.facets(_group(layer)) for layer in part]) for part in parts]
-        state = State(cracked_space(mesh, ("Lagrange", 1, (mesh.geometry.dim,)), [*facets, *broken]))
-        solids = tuple(
-            Solid(state, layer.material, where, name=layer.name, viscosity=damping * layer.material.young)
-            for layer, where in zip(layers, cells, strict=True)
-        )
+        broken = [domain.facets("notch")] if "notch" in domain.names else []
+        state = cracked_state(domain, [*facets, *broken], degree, axisymmetric)
+        solids = tuple(_solid(state, layer, where, damping) for layer, where in zip(layers, cells, strict=True))
+        names = ["crack"] if len(parts) == 1 else [_group(part[0]) for part in parts]
         cracks = tuple(
-            Crack(
-                state,
-                where,
-                plus,
-                part[0].law,
-                young=_softest(part),
-                name="crack" if len(parts) == 1 else _group(part[0]),
-            )
-            for part, where in zip(parts, facets, strict=True)
+            Crack(state, where, towards, part[0].law, young=_softest(part), name=name)
+            for name, part, where in zip(names, parts, facets, strict=True)
         )
         through = [layer for layer in layers if layer not in parts[0][1:] and all(layer not in p for p in parts[1:])]
-        notch = Crack(state, broken[0], plus, None, young=_softest(through), name="notch") if notched else None
-        return cls(tuple(layers), domain, state, solids, cracks, notch)
-
-    @property
-    def terms(self) -> list[Solid | Crack]:
-        """Solids and cracks, for the mechanical problem."""
-        return [*self.solids, *self.cracks, *([] if self.notch is None else [self.notch])]
+        notch = [Crack(state, where, towards, None, young=_softest(through), name="notch") for where in broken]
+        return cls(domain, state, solids, cracks, notch[0] if notch else None, tuple(layers))
 
     def layers_of(self, crack: Crack) -> list[Layer]:
         """The layers through which a part of the crack goes."""
         return _parts(self.layers, self.domain)[self.cracks.index(crack)]
 
-    def columns(self, _: Columns) -> Columns:
+    def columns(self, columns: Columns) -> Columns:
         """Energies of each layer: held by its strain, and spent on the crack in it. Collective."""
-        columns: Columns = {}
+        rows: Columns = {}
         for solid in self.solids:
-            columns[f"{solid.name}_strain"] = (solid.energies()["strain"], "energy")
+            rows[f"{solid.name}_strain"] = (solid.energies()["strain"], "energy")
         for crack in self.cracks:
             spent = crack.point_values("dissipated")
             for layer in self.layers_of(crack):
                 within = np.isin(crack.points.facets, self.domain.facets(_group(layer)))
-                columns[f"{layer.name}_fracture"] = (crack.points.integral(spent * within[:, None]), "energy")
-        return columns
+                rows[f"{layer.name}_fracture"] = (crack.points.integral(spent * within[:, None]), "energy")
+        return rows
+
+
+def _solid(state: State, layer: Layer, cells: NDArray[np.int32], damping: float) -> Solid:
+    options = {"viscosity": damping * layer.material.young, **layer.solid}
+    return Solid(state, layer.material, cells, name=layer.name, **options)
 
 
 def _group(layer: Layer) -> str:

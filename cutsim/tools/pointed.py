@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import cos, pi, sin, tan
+from typing import ClassVar
 
 import numpy as np
 import ufl
@@ -12,6 +13,7 @@ from cutsim.base.checks import above, between, positive, require, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.interface.contact import PenaltyContact
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit
 
 
@@ -45,6 +47,9 @@ class Pointed(ABC):
         push: Direction in which the tool points; the reference point is the foremost point of the tip.
         lateral: Direction normal to the plane in which the tool is halved.
         side: 0 for the whole tool, +1 or −1 for the half on the side of ±lateral.
+        round: Whether it is a body of revolution about its axis, else it extends along an edge.
+        firmness: Penalty of its contact with a soft solid, times mesh size over Young's modulus, and half the width of
+            the quadratic start over the tip radius; as `contact` takes them.
     """
 
     half_angle: float
@@ -52,6 +57,9 @@ class Pointed(ABC):
     push: Direction
     lateral: Direction | None
     side: int
+    round: ClassVar[bool]
+    # measured: stiff enough for the force, soft enough for Newton's method
+    firmness: ClassVar[tuple[float, float]]
 
     @property
     @abstractmethod
@@ -62,6 +70,16 @@ class Pointed(ABC):
     def resolution(self) -> float:
         """Tip radius [length]."""
         return self.tip_radius
+
+    def contact(self, young: float, h: float) -> PenaltyContact:
+        """Contact law of the tool in a soft solid, as soft as the force allows.
+
+        Args:
+            young: Young's modulus of the solid [stress].
+            h: Size of its cells normal to the surface [length].
+        """
+        factor, blend = self.firmness
+        return PenaltyContact.automatic(young, h, factor, blend=blend * self.tip_radius)
 
     @property
     def shaft_height(self) -> float:
@@ -135,6 +153,9 @@ class Blade(Pointed):
         ValueError: A value is outside its range, or push and lateral are not orthogonal.
     """
 
+    round: ClassVar[bool] = False
+    firmness: ClassVar[tuple[float, float]] = (5.0, 0.4)
+
     half_angle: float
     tip_radius: float
     half_thickness: float
@@ -174,6 +195,9 @@ class Needle(Pointed):
     Raises:
         ValueError: A value is outside its range, or push and lateral are not orthogonal.
     """
+
+    round: ClassVar[bool] = True
+    firmness: ClassVar[tuple[float, float]] = (20.0, 0.1)  # pressed harder than a blade, all along its shaft
 
     half_angle: float
     tip_radius: float

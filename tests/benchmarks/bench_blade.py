@@ -10,8 +10,18 @@ import numpy as np
 from common import measure
 from mpi4py import MPI
 
-from cutsim import Blade, Exponential, NeoHookean, StepControl, StepReport, read_geo, run
-from cutsim.studies.insertion import Insertion
+from cutsim import (
+    Blade,
+    Drive,
+    Exponential,
+    Insertion,
+    NeoHookean,
+    StepControl,
+    StepReport,
+    cracked_block,
+    read_geo,
+    run,
+)
 
 MESH = Path(__file__).parents[2] / "meshes" / "block.geo"
 BLOCK = {"dim": 2, "Lx": 10.0, "H": 6.0, "lc": 0.05, "band": 0.4, "notch": 0.5}
@@ -24,7 +34,8 @@ def main() -> None:
         law = Exponential.from_parameters(strength=0.6, toughness=0.2)
         blade = Blade(np.radians(12), 0.05, 0.855)
         domain = read_geo(MESH, comm, BLOCK, gdim=2)
-        cut = Insertion.build(domain, NeoHookean(0.777, 0.45), law, blade, notch=0.5, viscosity=0.002)
+        body = cracked_block(domain, NeoHookean(0.777, 0.45), law, viscosity=0.002)
+        cut = Insertion.build(body, blade, Drive(1.0, 1.0), notch=0.5)
     with measure(comm) as usage:
         run(cut.mechanics, cut.time_of(3.0), StepControl(first=0.02, largest=0.1), reports.append)
     force = cut.columns({})["force"][0]

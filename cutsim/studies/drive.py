@@ -1,0 +1,132 @@
+"""How a tool is driven: into the notch, then pushed at a constant speed, perhaps drawn back and pushed once more."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutsim.base.checks import above, at_least, between, positive, require, require_number
+from cutsim.base.signatures import checked
+from cutsim.studies.frame import Frame
+from cutsim.tools.pointed import Pointed
+from cutsim.tools.shapes import Path
+
+#: Depth of the tip, as a part of the depth of the notch, when the push begins.
+TIP_IN_NOTCH = 0.8
+
+
+@checked
+@dataclass(frozen=True)
+class Drive:
+    """What a user says of the motion of a tool.
+
+    Args:
+        speed: Speed of the push, > 0 [length/time].
+        entry_time: Time > 0 in which the tool comes into the notch, or to the surface of a body without one [time]. By
+            default it is that in which the push would come as far.
+        turning_depth: Depth of the tip at which the tool turns back to where the push began, to be pushed once more
+            [length]; None if it goes on.
+
+    Raises:
+        ValueError: A number is outside its range.
+    """
+
+    speed: float
+    entry_time: float | None = None
+    turning_depth: float | None = None
+
+    def __post_init__(self) -> None:
+        require_number("speed", self.speed, positive)
+        require_number("entry_time", self.entry_time, positive.or_none)
+        require_number("turning_depth", self.turning_depth, positive.or_none)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The motion of a tool in a body: depths and times.
+
+    In a notch the halves of a tool are spread apart from beside each other, at the depth at which the push begins; a
+    whole tool comes from the surface.  Without a notch either comes from a tip radius above the surface.
+
+    Attributes:
+        speed: Speed of the push [length/time].
+        start_height: How far above the start of the push a whole tool begins [length].
+        start_depth: Depth of the tip when the push begins [length].
+        entry_time: Time at which the push begins [time].
+        turning_depth: Depth at which the tool turns back, None if it does not [length].
+        height: Depth of the body's far side [length].
+    """
+
+    speed: float
+    start_height: float
+    start_depth: float
+    entry_time: float
+    turning_depth: float | None
+    height: float
+
+    @classmethod
+    def of(cls, drive: Drive, tool: Pointed, notch: float, height: float) -> "Motion":
+        """The motion of a tool in a body with a notch, or without one, of a height.
+
+        Raises:
+            ValueError: The tool is to turn before the push begins, or below the body.
+        """
+        start_depth = TIP_IN_NOTCH * notch
+        start_height = start_depth or tool.tip_radius
+        if drive.turning_depth is not None:
+            require_number("turning_depth", drive.turning_depth, above(start_depth, "the start of the push"))
+            require_number("turning_depth", drive.turning_depth, between(0, height, name="the height of the body"))
+        entry_time = drive.entry_time or start_height / drive.speed
+        return cls(drive.speed, start_height, start_depth, entry_time, drive.turning_depth, height)
+
+    @property
+    def pushes(self) -> int:
+        """How often the tool is pushed."""
+        return 1 if self.turning_depth is None else 2
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times at which the velocity jumps [time]."""
+        if self.turning_depth is None:
+            return (self.entry_time,)
+        return self.entry_time, self.time_of(self.turning_depth), self.time_of(self.start_depth, 2)
+
+    def time_of(self, depth: float, push: int = 1) -> float:
+        """Time at which the tip is this deep below the surface in the first or second push [time].
+
+        Raises:
+            ValueError: The push begins deeper, the body or the first push ends before, or there is no such push.
+        """
+        require_number("depth", depth, at_least(self.start_depth, "the start of the push"))
+        require_number("depth", depth, between(self.start_depth, self.height, "[)", name="the height of the body"))
+        require("push", push, push in range(1, self.pushes + 1), f"1 … {self.pushes}")
+        way, turning = depth - self.start_depth, self.turning_depth
+        if turning is not None:
+            require("depth", depth, push == 2 or depth <= turning, f"<= turning_depth = {turning}")
+            way += 2 * (turning - self.start_depth) * (push - 1)
+        return self.entry_time + way / self.speed
+
+    def depth(self, time: float) -> float:
+        """Depth of the tip of a whole tool at a time [length]."""
+        way = self.speed * (time - self.entry_time)
+        if way < 0:
+            return self.start_depth - self.start_height * (1 - time / self.entry_time)
+        leg = np.inf if self.turning_depth is None else self.turning_depth - self.start_depth
+        return self.start_depth + (way if way <= leg else abs(2 * leg - way))
+
+    def path(self, frame: Frame, tool: Pointed) -> Path:
+        """Path of a tool, or of a half of it, in a frame."""
+        return Path(self._spread(frame, tool) if tool.side and self.start_depth else self._lower(frame), self.corners)
+
+    def _lower(self, frame: Frame) -> Callable[[float], NDArray[np.float64]]:
+        return lambda time: frame.point(self.depth(time))
+
+    def _spread(self, frame: Frame, half: Pointed) -> Callable[[float], NDArray[np.float64]]:
+        start = -half.side * half.half_width(self.start_depth)
+
+        def position(time: float) -> NDArray[np.float64]:
+            still_to_come = max(1 - time / self.entry_time, 0.0)
+            return frame.point(max(self.depth(time), self.start_depth), start * still_to_come)
+
+        return position

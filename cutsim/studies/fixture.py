@@ -1,0 +1,140 @@
+"""How a body is held while a tool is pushed into it, and where the tool meets it first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from dolfinx.mesh import compute_midpoints, locate_entities_boundary
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from cutsim.base.checks import finite, require, require_number
+from cutsim.base.parameters import History
+from cutsim.base.signatures import checked
+from cutsim.bodies.loads import Support
+from cutsim.studies.body import CrackedBody
+from cutsim.studies.frame import FLAT, Array, Facets, Frame
+
+
+@checked
+@dataclass(frozen=True)
+class Fixture:
+    """Names of groups of a mesh: where the tool meets the body, and what holds it.
+
+    The body rests on a smooth plate. Where its ends are free it is also held across the crack plane along the line in
+    which that meets the plate; in space, without plane of symmetry or walls, also along this line, in its middle.
+
+    Args:
+        top: Facets of the surface beside the '−' and the '+' face of the crack.
+        plate: Facets on the plate, on the far side of the body.
+        symmetry: Facets in the plane of symmetry that halves body and tool; used if the mesh has this group.
+        walls: Facets that are held along the edge of the tool: a body between two of them is in plane strain.
+        ends: Facets at the far ends, one group on either side of the crack plane, which are held along its normal; they
+            are free if there are none.
+        drawn: Way by which each end is drawn outwards while the tool comes into the notch [length].
+        thread: Cells of the thread in a body of revolution, which stays on the axis.
+
+    Raises:
+        ValueError: Ends are to be drawn and there are none.
+    """
+
+    top: tuple[str, str] = ("top_left", "top_right")
+    plate: str = "bottom"
+    symmetry: str = "symmetry"
+    walls: tuple[str, ...] = ()
+    ends: tuple[str, ...] = ()
+    drawn: float = 0.0
+    thread: str = "left"
+
+    def __post_init__(self) -> None:
+        require_number("drawn", self.drawn, finite)
+        require("drawn", self.drawn, not self.drawn or len(self.ends) > 0, "0 for a body with free ends")
+        require("top", self.top, len(self.top) == 2, "the groups beside the '−' and the '+' face")
+
+    def check(self, body: CrackedBody) -> None:
+        """Refuse names that are no groups of the mesh.
+
+        Raises:
+            ValueError: With the name, and those that the mesh has.
+        """
+        for parameter, names in (
+            ("top", self.top),
+            ("plate", (self.plate,)),
+            ("walls", self.walls),
+            ("ends", self.ends),
+        ):
+            _facets(body, f"fixture.{parameter}", names)
+
+    def halved(self, body: CrackedBody) -> bool:
+        """Whether the mesh is that of a half, with a plane of symmetry."""
+        return self.symmetry in body.domain.names
+
+    def support(self, body: CrackedBody, frame: Frame) -> Support:
+        """The plate; its reaction acts against the push."""
+        return _held(body, body.domain.facets(self.plate), -frame.push, name="plate")
+
+    def supports(self, body: CrackedBody, frame: Frame, entry_time: float) -> list[Support]:
+        """All that holds the body beside the plate. Collective."""
+        domain, edge = body.domain, frame.edge
+        if body.state.axisymmetric:
+            return [Support(body.state, domain.cells(self.thread), 0, dim=2)]
+        parts = [self._end(body, frame, name, entry_time) for name in self.ends]
+        line = _line(body, frame)
+        if not self.ends:
+            parts.append(_held(body, line, frame.normal, dim=0))
+        if edge is None:
+            return parts
+        along = [*self.walls, *([self.symmetry] if self.halved(body) else [])]
+        if not along:
+            return [*parts, _held(body, _middle_of(body, line, frame, edge), edge, dim=0)]
+        return parts + [_held(body, domain.facets(name), edge) for name in along]
+
+    def _end(self, body: CrackedBody, frame: Frame, name: str, entry_time: float) -> Support:
+        """A far end, drawn outwards at a constant speed, then held."""
+        facets, drawn = body.domain.facets(name), self.drawn
+        side = 1 if sum(frame.span(body.domain.mesh, facets, frame.normal)) > 0 else -1
+
+        def way(time: float) -> float:
+            return side * drawn * min(time / entry_time, 1.0)
+
+        return _held(body, facets, frame.normal, way, corners=(entry_time,), name=name)
+
+
+#: A body that stands on a plate, its sides free.
+STANDING = Fixture()
+
+
+def _held(
+    body: CrackedBody, entities: NDArray[np.int32], direction: Array, value: float | History = 0.0, **options: Any
+) -> Support:
+    return Support(body.state, entities, tuple(direction), value, **options)
+
+
+def _facets(body: CrackedBody, parameter: str, names: Sequence[str]) -> Facets:
+    """Facets of some groups, none without a name."""
+    domain = body.domain
+    known = [name for name, (dim, _) in domain.names.items() if dim == domain.mesh.topology.dim - 1]
+    require(parameter, names, set(names) <= set(known), f"groups of facets of the mesh: {', '.join(known)}")
+    return np.concatenate([np.empty(0, dtype=np.int32), *(domain.facets(name) for name in names)])
+
+
+def _line(body: CrackedBody, frame: Frame) -> NDArray[np.int32]:
+    """Vertices in which the crack plane meets the plate."""
+    slack = FLAT * frame.height
+
+    def on_line(x: Array) -> NDArray[np.bool_]:
+        arms = x[: len(frame.origin)].T - frame.origin
+        return (np.abs(arms @ frame.normal) <= slack) & (np.abs(arms @ frame.push - frame.height) <= slack)
+
+    return np.asarray(locate_entities_boundary(body.domain.mesh, 0, on_line))
+
+
+def _middle_of(body: CrackedBody, vertices: NDArray[np.int32], frame: Frame, edge: Array) -> NDArray[np.int32]:
+    """The one of some vertices that is nearest to the tool along its edge. Collective."""
+    mesh = body.domain.mesh
+    arms = (compute_midpoints(mesh, 0, vertices).reshape(-1, 3) - frame.origin) @ edge
+    # of two that are equally near the one ahead
+    distances = np.round(np.abs(arms) / (FLAT * frame.height)) - 0.25 * np.sign(arms)
+    nearest = mesh.comm.allreduce(float(distances.min(initial=np.inf)), MPI.MIN)
+    return vertices[distances == nearest]
