@@ -6,14 +6,14 @@
 # ## What theory says
 #
 # Arms of height $h$ and width $b$ with plane modulus $E'$ and $I = b h^3/12$ bend like cantilevers that are a
-# little longer than the crack, $a + \chi h$, because the bond ahead of it gives way (Williams 1989).  With the
+# little longer than the crack, $a + \chi h$, because the bond ahead of it yields (Williams 1989).  With the
 # force $P$ the loaded ends are a distance $w$ apart, and the crack grows once the energy-release rate is $G_c$:
 #
 # $$ w = \frac{2 P (a + \chi h)^3}{3 E' I}, \qquad
 #    G = \frac{P^2 (a + \chi h)^2}{b E' I} = G_c \;\Rightarrow\; P = \frac{\sqrt{G_c b E' I}}{a + \chi h}. $$
 #
 # In steady growth every newly broken area $b\,\Delta a$ dissipates $G_c\, b\,\Delta a$, whatever the shape of the law.
-# The advance $\Delta a$ is measured twice: from the area $\int D \,\mathrm{d}\Gamma$ on which damage has come over,
+# The advance $\Delta a$ is measured twice: from the damaged area $\int D \,\mathrm{d}\Gamma$,
 # and from the place where the damage crosses one half.
 #
 # ## Two specimens
@@ -22,13 +22,13 @@
 # strength 57 MPa.  The beam's peak is 4.245 N per mm of width at $w$ = 1.363 mm; a bond of finite strength, whose
 # process zone is 2 to 3 mm long, peaks lower and later.
 #
-# *thesis*: arms of 20 × 4 mm, length 125 mm, $E$ = 50 GPa, $\nu$ = 0.48 (Table 4.2), loaded, unloaded and loaded again.
-# The table gives three numbers for the bond that contradict each other: a strength of 2.5 MPa, an opening of
-# 0.001 mm and $G_c$ = 28.3 N/mm, where the law implies $e\,t\,\varepsilon$ = 0.0068 N/mm.  Strength and opening are are
-# used here.  With 28.3 N/mm and 2.5 MPa the opening would be 4.2 mm and Irwin's length $E G_c/t^2$ 226 m: no crack
-# forms in such a beam; with 28.3 N/mm and 0.001 mm the strength would be 10 GPa.  The mesh of 3751 = 31·11·11 nodes is
-# that of one arm, so the printed depth of 4 mm is taken as the height of an arm.  The thesis names no initial crack;
-# 30 mm are taken.
+# *thesis* (K. Bronik): arms of 20 × 4 mm, length 125 mm, $E$ = 50 GPa, $\nu$ = 0.48 (Table 4.2), loaded, unloaded and
+# loaded again.  The table gives three numbers for the bond that contradict each other: a strength of 2.5 MPa, an
+# opening of 0.001 mm and $G_c$ = 28.3 N/mm, where the law implies $e\,t\,\varepsilon$ = 0.0068 N/mm.  Strength and
+# opening are used here.  With 28.3 N/mm and 2.5 MPa the opening would be 4.2 mm and Irwin's length $E G_c/t^2$ 226 m:
+# no crack forms in such a beam; with 28.3 N/mm and 0.001 mm the strength would be 10 GPa.  The mesh of 3751 =
+# 31·11·11 nodes is that of one arm, so the printed depth of 4 mm is taken as the height of an arm.  The thesis names
+# no initial crack; 30 mm are taken.
 #
 # **Unloading.**  A bond unloads along the secant to the origin, and so does the whole specimen: contact, damaged bond
 # and small-strain arms are all of degree one, hence the force is proportional to the opening until the opening exceeds

@@ -1,8 +1,8 @@
 # # End-notched flexure
 #
 # Two bonded arms, cracked from one end, are bent over three pins.  The arms slide on each other, and the bond breaks in
-# shear (mode II).  Above the left pin their faces are pressed together, and where they rub, work goes into friction
-# that must not be taken for toughness.
+# shear (mode II).  Above the left pin their faces are pressed together and rub.  The work of this friction must not be
+# taken for toughness.
 #
 # ## What theory says
 #
@@ -14,7 +14,7 @@
 #    \frac{w}{P} = \frac{3 a'^3 + 2 L^3}{8 E' b h^3} + \frac{3 L}{10\, G_s b h}. $$
 #
 # At prescribed deflection the growth is stable from $a' = 0.69\,L$ on; here it begins at $a = 0.75\,L$.  The correction
-# is 2 to 3 per cent of $G_{II}$: the simple beam, $\chi = 0$, misses by that much.
+# is 2 to 3 per cent of $G_{II}$, which is the error of the simple beam with $\chi = 0$.
 #
 # **Friction.**  Both arms bend alike, hence each carries half of the shear force $P/2$, and above the pin they press on
 # each other with $P/4$.  Friction $F = \mu P/4$ acts on the upper arm and against it on the lower one, a couple
@@ -25,7 +25,7 @@
 #    = \frac{9\,(m - \tfrac{4}{3} F h)^2}{4 E' b h^3}
 #    \;\Rightarrow\; G_{II} = \frac{9 P^2 (a' - \tfrac{2}{3} \mu h)^2}{16 E' b^2 h^3}, $$
 #
-# so that friction relieves the front like a crack that is shorter by $2 \mu h/3$.  The work it takes is $F$ times the
+# so that friction unloads the front like a crack that is shorter by $2 \mu h/3$.  Its work is $F$ times the
 # sliding above the pin, $s = 3 P a' (a' - \tfrac{4}{3} \mu h) / (2 E' b h^2)$, while load and crack grow.
 #
 # ## The specimen
@@ -127,7 +127,7 @@ QUICK = replace(FULL, size=0.75, layers=2, deflections=(0.9, 1.14), steps=(6, 30
 #
 # The pins hold points of the lower face, the load pushes a point of the upper one: rollers leave the arms free to
 # slide.  The arms touch along the whole crack but press on each other above the pin only.  A contact whose pressure
-# begins gradually does not toggle there.
+# begins gradually does not alternate between open and closed there.
 
 
 @dataclass(frozen=True)
@@ -229,10 +229,10 @@ def before_growth(specimen: Specimen, friction: float) -> dict[str, float]:
 
 # ## Growth
 #
-# Theory has a sharp front in a bond that does not give.  Here the bond yields ahead of the crack before it breaks: the
-# beam is a little softer, the peak rounded and lower.  Once the process zone travels, load and deflection are those of
-# theory.  The front is taken where the bond carries its strength, at a slide of $\varepsilon_t/\sqrt2$: ahead of it
-# the bond still takes more, behind it gives way.
+# Theory assumes a sharp front in a rigid bond.  Here the bond deforms ahead of the crack before it breaks, so the
+# beam is a little softer and the peak is rounded and lower.  Once the process zone travels, load and deflection are
+# those of theory.  The front is where the bond carries its strength, at a slide of $\varepsilon_t/\sqrt2$: ahead of
+# it the traction still rises, behind it the bond softens.
 
 
 def theory_curve(specimen: Specimen, friction: float) -> dict[str, np.ndarray]:

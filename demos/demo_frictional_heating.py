@@ -1,19 +1,21 @@
 # # Frictional heating
 #
 # A block of 10 × 10 × 10 mm is pressed on a slab of 100 × 10 × 10 mm and slid on it.  The work of friction becomes heat
-# in the interface, which flows into both bodies as the pressure lets it.  Everything but the contact is insulated.
+# in the interface and flows into both bodies at a rate set by the pressure.  All surfaces but the contact are
+# insulated.
 #
 # ## What theory says
 #
 # Under a uniform pressure $p$, friction $\mu$ and at the speed $v$, the interface generates $D = \mu p v$ per area.
-# Nothing is lost, so that block, slab (masses $m$, specific heat $c$) and an interface of area $A$ and capacity $C_c$
-# have warmed in the mean, weighted by their capacities, by
+# No heat is lost.  The mean temperature of block, slab (masses $m$, specific heat $c$) and an interface of area $A$ and
+# capacity $C_c$, weighted by their capacities, has therefore risen by
 #
 # $$ \Delta\bar T = \frac{\int D A\,\mathrm{d}t}{\sum m c + C_c A}
 #    = \frac{\mu p A\,(s - n\,\mu p/\varepsilon_T)}{\sum m c + C_c A} $$
 #
-# after a way $s$.  The penalty $\varepsilon_T$ that holds the faces till they slip takes $\mu p/\varepsilon_T$ of the
-# first stroke, and twice that of each that follows: $n = 1, 3, 5\dots$ after 1, 2, 3… strokes.
+# after a sliding distance $s$.  The penalty $\varepsilon_T$ that holds the faces till they slip takes
+# $\mu p/\varepsilon_T$ of the first stroke, and twice that of each that follows: $n = 1, 3, 5\dots$ after 1, 2, 3…
+# strokes.
 #
 # **Steady heat flow.**  Two slabs with $\kappa_i = k_i/h_i$ of conductivity and thickness, their outer faces kept at
 # $T_1$ and $T_2$, exchange heat through $\gamma_1 p$ and $\gamma_2 p$ in series: a flux and two faces with
@@ -21,9 +23,9 @@
 # $$ q = \frac{T_1 - T_2}{\frac{1}{\kappa_1} + \frac{1}{\gamma_1 p} + \frac{1}{\gamma_2 p} + \frac{1}{\kappa_2}}, \qquad
 #    T_{c1} = T_1 - \frac{q}{\kappa_1}, \quad T_{c2} = T_2 + \frac{q}{\kappa_2} . $$
 #
-# For equal slabs these are the temperatures (4.133) of the thesis, which prints the two with their names exchanged:
-# $T_{c1} = [\gamma p\,T_2 + (2\kappa + \gamma p)\,T_1]/(2\kappa + 2\gamma p)$.  A conductance $\kappa$ is meant
-# there, though the table gives a conductivity.
+# For equal slabs these are the temperatures (4.133) of K. Bronik's thesis, which prints the two with their names
+# exchanged: $T_{c1} = [\gamma p\,T_2 + (2\kappa + \gamma p)\,T_1]/(2\kappa + 2\gamma p)$.  A conductance $\kappa$ is
+# meant there, though the table gives a conductivity.
 #
 # **Sharing.**  Where both faces have the same temperature, $q^\pm = -\gamma^\pm D/(\gamma^+ + \gamma^-)$.
 #
@@ -54,9 +56,9 @@
 # | $T_0$ = 0 °C, 10 steps of 0.1 | 0 °C; 10 steps of 0.1 s and 0.1 mm |
 # | pressure: not given | 0.1 MPa |
 #
-# These numbers make no sensible problem.  An interface of that capacity equals a layer of the bodies one metre thick
-# and keeps 95 % of the heat.  The 0.9 mJ of the slide warm everything by 0.08 mK; without the interface they would warm
-# the bodies by 0.8 mK.  Conductivity is that of a metal, stiffness and pressure those of rubber.
+# These numbers do not make a realistic problem.  An interface of that capacity equals a layer of the bodies one metre
+# thick and keeps 95 % of the heat.  The 0.9 mJ of the slide warm everything by 0.08 mK; without the interface they
+# would warm the bodies by 0.8 mK.  Conductivity is that of a metal, stiffness and pressure those of rubber.
 #
 # *column*: two blocks of steel under 100 MPa, rubbed back and forth over one millimetre at 10 mm/s.  The contact
 # conducts 15 mW/(mm² K), as ground steel does; its slab side three times as well as its block side.  Asperities give by

@@ -1,13 +1,13 @@
 # # Hertzian contact
 #
-# Round bodies touch at a point or along a line and flatten each other.  Where they touch, how hard they press and where
-# they begin to slip is known in closed form, which makes them the benchmark of contact: here for a rigid ball, and for
-# two deformable bodies whose meshes do not match.
+# Round bodies touch at a point or along a line and flatten each other.  The size of the contact, the pressure and the
+# onset of slip are known in closed form, which makes these bodies the benchmark of contact: here for a rigid ball, and
+# for two deformable bodies whose meshes do not match.
 #
 # ## What theory says
 #
-# **A ball** of radius $R$ that approaches a large body by $d$ touches it within a radius $a$ (Hertz 1881; thesis
-# 4.96–4.100), with
+# **A ball** of radius $R$ that approaches a large body by $d$ touches it within a radius $a$ (Hertz 1881; K. Bronik's
+# thesis, 4.96–4.100), with
 #
 # $$ F = \tfrac{4}{3} E^* \sqrt{R}\, d^{3/2}, \qquad a = \sqrt{R d}, \qquad p_0 = \frac{2 E^* a}{\pi R}, \qquad
 #    \frac{1}{E^*} = \frac{1-\nu_1^2}{E_1} + \frac{1-\nu_2^2}{E_2}. $$
@@ -17,12 +17,12 @@
 #
 # $$ -u_r = \frac{(1-2\nu)(1+\nu)\, p_0 a^2}{3 E r} \left[ 1 - \left( 1 - \frac{r^2}{a^2} \right)^{3/2} \right], $$
 #
-# there the ball is lower by $-r u_r/R$, and the energy grows by $\int p\, (-r u_r/R)\, dA$, hence the force by
+# where the ball is lower by $-r u_r/R$, and the energy grows by $\int p\, (-r u_r/R)\, dA$, hence the force by
 #
 # $$ \frac{\Delta F}{F} = \frac{1 - 2\nu}{\pi (1-\nu)}\, \frac{a}{R}, $$
 #
-# which is 2.9 per cent at the end here; of higher order are some tenths of a per cent less.  Two equal bodies draw
-# inwards alike.
+# which is 2.9 per cent at the end here; higher orders reduce it by some tenths of a per cent.  Two equal bodies are
+# drawn inwards alike.
 #
 # **Cylinders** under the line load $P$, with $1/R = 1/R_1 + 1/R_2$, touch within the half width $a$:
 #

@@ -1,17 +1,17 @@
 # # Ironing
 #
 # A stiff die with a round face is pressed into a soft slab and drawn along it over twice its width.  The meshes do not
-# match: facets of the die pass over those of the slab, and what presses on what changes in every step.  A contact
+# match: facets of the die pass over those of the slab, and the pairs in contact change in every step.  A contact
 # between nodes and facets shows this as ripple in the forces; here forces come from an integral over the slab's face,
 # and each of its points meets the die along its own normal.
 #
-# ## What is to be expected
+# ## What theory says
 #
 # Far from the ends of the slab nothing changes while the die is drawn at a constant depth.  Hence
 #
-# - both forces are constant, and what ripple there is comes from the mesh and vanishes with the size of its elements;
-# - without friction the drag is zero, as the slab is elastic and gives back what it took;
-# - with friction $\mu$ the work of the drag all goes into friction, $F\,\dot s = \dot D$, and $F \approx \mu N$.
+# - both forces are constant; any ripple comes from the mesh and vanishes with the size of its elements;
+# - without friction the drag is zero, as the slab is elastic and recovers;
+# - with friction $\mu$ all work of the drag is friction work, $F\,\dot s = \dot D$, and $F \approx \mu N$.
 #
 # ## The problem
 #
@@ -20,8 +20,8 @@
 # top: 0.2 mm down, a tenth of the slab, and 4 mm along, in steps of an eighth of an element.  Its facets are 1.3 times
 # as long as those of the slab.
 #
-# Ripple is the difference of the largest and the smallest force, the first millimetre left out, over the mean normal
-# force; that of the drag with friction is over its own mean.
+# The ripple is the difference between the largest and the smallest force, without the first millimetre, over the mean
+# normal force.  For the drag with friction it is taken over its own mean.
 
 import logging
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 # # Three-point bending of a notched beam
 #
-# The beam of the thesis (section 4.5.1): length 100 mm, span $S = 80$ mm, height $W = 20$ mm, thickness $B = 10$ mm,
-# notch $a = 9$ mm, $E = 50$ GPa, $\nu = 0.48$.  A load $P$ at mid-span opens the notch in mode I.
+# The beam of K. Bronik's thesis (section 4.5.1): length 100 mm, span $S = 80$ mm, height $W = 20$ mm, thickness
+# $B = 10$ mm, notch $a = 9$ mm, $E = 50$ GPa, $\nu = 0.48$.  A load $P$ at mid-span opens the notch in mode I.
 #
 # ## Below propagation
 #
@@ -9,10 +9,10 @@
 # $$K_I = \frac{P S}{B W^{3/2}} f\!\left(\frac aW\right), \qquad
 #   f(x) = \frac{3\sqrt x\,[1.99 - x(1-x)(2.15 - 3.93x + 2.7x^2)]}{2(1+2x)(1-x)^{3/2}}, \qquad
 #   G = \frac{K_I^2}{E'} .$$
-# The simulation finds $G$ in two other ways.  The domain integral, with $q$ falling from 1 at the tip to 0,
+# The simulation finds $G$ in two other ways.  One is the domain integral, with $q$ falling from 1 at the tip to 0,
 # $$J = \frac1B \int (P : (\nabla u\, e \otimes \nabla q) - W_e\, e\cdot\nabla q)\,\mathrm dX ,$$
-# and the energy audit: $G = -\frac1B\,\mathrm dU/\mathrm da$ at a fixed displacement of the load.  A crack is a set of
-# facets of the mesh, so that a longer or shorter notch is the same mesh with a facet more or less.
+# The other is the energy: $G = -\frac1B\,\mathrm dU/\mathrm da$ at a fixed displacement of the load.  A crack is a
+# set of facets of the mesh, so that a longer or shorter notch is the same mesh with one facet more or less.
 #
 # ## Propagation
 #
@@ -22,15 +22,15 @@
 #   \left(\frac{P_c}{P}\right)^2 = 1 + c\,\frac{\ell}{W} + \dots \quad\text{(Bažant's size effect)},$$
 # so that the parabola through $(P_c/P)^2$ of three strengths, drawn to $\ell = 0$, ends near 1: within 2 % of the load.
 #
-# At the peak itself nothing is sharp, but three numbers have to agree, of which only the second knows the cohesive law:
-# $J$ over a domain that has the process zone within it; what the bond at the tip of the notch has cost by its opening,
-# $\int_0^{\delta_\mathrm{tip}} T\,\mathrm d\delta$ (Rice); and $G$ of the sharp crack that is as compliant, by load and
-# deflection and the formulas above.  When the bond at the notch has gone, $J$ is $G_c$ and stays so.
+# At the peak the crack is not sharp, but three numbers must agree, of which only the second uses the cohesive law:
+# $J$ over a domain that contains the process zone; the work of the bond at the tip of the notch,
+# $\int_0^{\delta_\mathrm{tip}} T\,\mathrm d\delta$ (Rice); and $G$ of the sharp crack with the same compliance, from
+# load, deflection and the formulas above.  Once the bond at the notch is broken, $J$ is $G_c$ and stays constant.
 #
 # **The parameters.**  The thesis prints a strength of 2–2.5 MPa, an opening of 0.001 mm and $G_c$ = 28.3–50 N/mm.  The
 # first two imply $G_c = e\,t\,\varepsilon$ = 0.0068 N/mm, a four-thousandth of the third.  The demo takes 0.0068 N/mm,
-# which goes with the printed opening.  Even so $\ell$ = 71 mm is longer than the beam is high: the strength of 2.5 MPa
-# decides, not the fracture energy.  Higher strengths make the beam brittle; the printed one is run too, to compare.
+# which agrees with the printed opening.  Even so $\ell$ = 71 mm exceeds the height of the beam: the strength of 2.5 MPa
+# decides, not the fracture energy.  Higher strengths make the beam brittle; the printed one is run for comparison.
 
 import logging
 from collections.abc import Callable

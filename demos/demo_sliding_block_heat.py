@@ -1,17 +1,19 @@
 # # A sliding block and its hot spot
 #
 # A block of 10 mm is pressed on a slab of 100 mm and slides over 60 mm of it.  Friction heats both, and the hot spot
-# travels along the slab.  The meshes have no node in common: every point of the block's face looks for its partner on
-# the slab, step after step, and gives its share of the heat to whatever it is there.
+# travels along the slab.  The meshes have no node in common: in every step, each point of the block's face finds its
+# partner on the slab and gives it its share of the heat.
 #
 # ## What theory says
 #
-# All is insulated but the contact, and nothing is lost: under a uniform pressure $p$, friction $\mu$ and after a way
-# $s$, block, slab (masses $m$, specific heat $c$) and an interface of area $A$ and capacity $C_c$ have warmed by
+# All surfaces but the contact are insulated, so no heat is lost.  Under a uniform pressure $p$, friction $\mu$ and
+# after a sliding distance $s$, block, slab (masses $m$, specific heat $c$) and an interface of area $A$ and capacity
+# $C_c$ have warmed by
 #
 # $$ \Delta\bar T = \frac{\mu p A\,(s - \mu p/\varepsilon_T)}{\sum m c + C_c A} $$
 #
-# in the mean; the penalty $\varepsilon_T$ that holds the faces till they slip has taken $\mu p/\varepsilon_T$ of it.
+# in the mean.  The penalty $\varepsilon_T$ that holds the faces until they slip has taken $\mu p/\varepsilon_T$ of
+# the distance.
 #
 # **Faces.**  A flux $q(t)$ that enters the slab through a band of width $B$, its middle at $c(t)$, warms the face by
 #
@@ -34,11 +36,11 @@
 #
 # ## What is computed
 #
-# Plane strain, per millimetre of width.  *thesis*: Tables 4.4 and 4.8, read as in the demo of frictional heating, now
-# with the whole way of 60 mm: $E$ = 5.1 MPa, $\nu$ = 0.48, $\mu$ = 0.1, $\varepsilon_T$ = 0.1 MPa/mm,
-# $k$ = 100 mW/(mm K), $\gamma^\pm$ = 1000 mW/(N K), $C_c$ = 100 mJ/(mm² K), $c$ = 10⁸ mJ/(t K), density 1 t/m³, 1 mm/s,
-# 0.1 MPa.  An interface of that capacity stays with the block and keeps 90 % of the heat, and the slab conducts so well
-# that no spot is seen.
+# Plane strain, per millimetre of width.  *thesis* (K. Bronik): Tables 4.4 and 4.8, read as in the demo of frictional
+# heating, now with the whole distance of 60 mm: $E$ = 5.1 MPa, $\nu$ = 0.48, $\mu$ = 0.1, $\varepsilon_T$ = 0.1
+# MPa/mm, $k$ = 100 mW/(mm K), $\gamma^\pm$ = 1000 mW/(N K), $C_c$ = 100 mJ/(mm² K), $c$ = 10⁸ mJ/(t K), density 1
+# t/m³, 1 mm/s, 0.1 MPa.  An interface of that capacity stays with the block and keeps 90 % of the heat, and the slab
+# conducts so well that no spot is seen.
 #
 # *insulator*: steel under 100 MPa at 10 mm/s, the block taking no heat, which theory has in closed form.  In both the
 # slab is fixed at every node, which makes the pressure uniform: its modulus does nothing.  *steel*:

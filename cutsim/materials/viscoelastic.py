@@ -57,7 +57,7 @@ class Prony:
         require_numbers("times", self.times, positive, len(self.strengths))
 
     def factors(self, dt: float) -> tuple[Array, Array]:
-        """What remains of each overstress after a step, and what it takes up of the change of stress in it."""
+        """Decay of each overstress over a step, and the fraction of the change of stress that it takes up."""
         x = dt / np.array(self.times)
         return np.exp(-x), -np.array(self.strengths) * np.expm1(-x) / x
 

@@ -96,7 +96,7 @@ def plot_energy(
     xlabel: str = "time [s]",
     unit: str = "mJ",
 ) -> None:
-    """Plot what became of the external work, and how well the audit closes. Call it on one rank.
+    """Plot the energy audit: stored and dissipated energies, and the closure. Call it on one rank.
 
     Args:
         path: The file; its suffix tells the format. Folders are made.
