@@ -30,7 +30,8 @@ from cutsim.fields.twins import unjoined
 from cutsim.interface.crack import Crack
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.solvers.convergence import TOLERANCES, Criteria, Tolerances
-from cutsim.solvers.newton import NonlinearProblem, Outcome
+from cutsim.solvers.iterations import Outcome
+from cutsim.solvers.newton import NonlinearProblem
 from cutsim.solvers.system import Structure
 
 # displacement over the size of the mesh at which a solve is given up

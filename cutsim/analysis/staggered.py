@@ -14,7 +14,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.heat.transfer import HeatTransfer
-from cutsim.solvers.newton import Outcome
+from cutsim.solvers.iterations import Outcome
 
 #: Passes of mechanics and heat allowed in one step.
 PASSES = 30

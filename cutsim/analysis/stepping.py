@@ -20,7 +20,7 @@ from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.state import State
-from cutsim.solvers.newton import LINE_SEARCHES, Outcome
+from cutsim.solvers.iterations import LINE_SEARCHES, Outcome
 
 logger = collective_logger(__name__)
 

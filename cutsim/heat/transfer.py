@@ -19,7 +19,8 @@ from cutsim.heat.balance import HeatBalance, HeatTerm
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.loads import PrescribedTemperature
 from cutsim.solvers.convergence import Criteria, Tolerances
-from cutsim.solvers.newton import NonlinearProblem, Outcome
+from cutsim.solvers.iterations import Outcome
+from cutsim.solvers.newton import NonlinearProblem
 from cutsim.solvers.system import Structure
 
 #: Smallest turnover to which the closure of the audit refers, as a fraction of the heat of all bodies above absolute
