@@ -1,1 +1,1 @@
-"""Newton's method, its tangent and its linear solvers."""
+"""Solvers: Newton's method, its tangent and its linear solvers."""

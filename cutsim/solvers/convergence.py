@@ -1,4 +1,4 @@
-"""The judge of convergence: it takes the numbers of an iterate and gives a reason to stop or to go on.
+"""Judge of convergence: from the numbers of an iterate to a reason to stop or to continue.
 
 The numbers are global, so that every rank decides alike; PETSc is not needed here.  Beside the residual, the
 displacement and the energy of a step may be judged, as FEBio and the program of K. Bronik, *Large deformation cohesive
@@ -28,7 +28,7 @@ STALL = 5
 
 
 class Reason(Enum):
-    """Why a solve goes on or stops; the value says it in words."""
+    """Reason why a solve continues or stops; the value says it in words."""
 
     GOING_ON = "not converged yet"
     CONVERGED = "converged"
@@ -41,7 +41,7 @@ class Reason(Enum):
 @checked
 @dataclass(frozen=True)
 class Tolerances:
-    """When an iterate is equilibrium; every criterion that is given has to hold.
+    """Tolerances of equilibrium; every criterion that is given must hold.
 
     A criterion on the displacement or the energy never ends a solve earlier than the residual alone would do. It
     matters where a soft direction lets the solution move far while the forces hardly change. Both need a step to
@@ -75,7 +75,7 @@ TOLERANCES = Tolerances()
 
 @dataclass(frozen=True)
 class Criteria:
-    """All that the judge goes by, apart from the iterates.
+    """Criteria of the judge, apart from the iterates.
 
     Args:
         tolerances: When an iterate is equilibrium.
@@ -96,7 +96,7 @@ CRITERIA = Criteria()
 
 @dataclass(frozen=True)
 class Iterate:
-    """The numbers of an iterate by which it is judged, the same on all ranks.
+    """Numbers of an iterate by which it is judged, the same on all ranks.
 
     Attributes:
         free: Norm of the forces that no support takes up [force].
@@ -125,7 +125,7 @@ class Iterate:
 
 @dataclass(frozen=True)
 class Norms:
-    """What is judged of an iterate.
+    """Norms of an iterate that are judged.
 
     Attributes:
         residual: Norm of the out-of-balance forces [force].
@@ -154,7 +154,7 @@ class Iteration:
 
 
 class Judge:
-    """Judges the iterates of one solve after the other.
+    """Judge of the iterates of one solve.
 
     Args:
         criteria: What it goes by.

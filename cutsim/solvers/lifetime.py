@@ -1,4 +1,4 @@
-"""PETSc and Python free each other's objects: what keeps a loop over many problems from using up communicators."""
+"""Lifetime of PETSc objects, so that a loop over many problems does not use up MPI communicators."""
 
 import gc
 from collections.abc import Callable

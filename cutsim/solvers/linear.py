@@ -1,4 +1,4 @@
-"""The linear solver of a problem: the preset that fits it, and a better one where it fails."""
+"""Linear solver of a problem: the preset that fits it, and a more robust one when it fails."""
 
 from petsc4py import PETSc
 

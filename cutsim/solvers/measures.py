@@ -1,4 +1,4 @@
-"""The numbers of an iterate, reduced over all ranks for the judge of convergence."""
+"""Measures of an iterate, reduced over all ranks for the judge of convergence."""
 
 from math import sqrt
 
@@ -11,7 +11,7 @@ from cutsim.solvers.system import System
 
 
 class Measures:
-    """Measures iterates and the steps between them. Every method but `note_direction` is collective.
+    """Measures of iterates and of the steps between them. Every method but `note_direction` is collective.
 
     Args:
         system: The equations.

@@ -1,4 +1,4 @@
-"""Unknowns beside the displacement, each with an equation that constrains it: the tangent becomes a saddle point.
+"""Multipliers: unknowns beside the displacement, each with a constraint, which make the tangent a saddle point.
 
 With K the tangent of the displacement's own balance R, Newton's method solves
 

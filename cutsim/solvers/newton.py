@@ -1,4 +1,4 @@
-"""The nonlinear problem F(u; v) = 0: one Newton solver with a preconditioner that looks after itself."""
+"""Newton's method for F(u; v) = 0, with a preconditioner that is kept and rebuilt when needed."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from cutsim.solvers.system import STRUCTURE, Structure, System
 
 @dataclass(frozen=True)
 class Kept:
-    """All that a solve leaves to the next one, beside the solution.
+    """Data that a solve passes on to the next one, beside the solution.
 
     The preconditioner is kept as well, which no number can tell: a problem goes on exactly like another one if both
     make it anew, by `LaggedPC.refresh(pattern=True)`.

@@ -1,4 +1,4 @@
-"""Linear solvers for the tangent: which preconditioner fits, how it is built, and when it is rebuilt."""
+"""Preconditioners for the tangent: which one fits, how it is built, and when it is rebuilt."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ FALLBACK_LIMIT = 200_000
 
 @dataclass(frozen=True)
 class Preset:
-    """A linear solver: a Krylov method, a preconditioner that is kept, and perhaps a strip along the crack.
+    """Preset of a linear solver: a Krylov method, a preconditioner that is kept, and perhaps a strip along the crack.
 
     Attributes:
         name: "direct", "bulk", "crack" or "saddle".

@@ -1,4 +1,4 @@
-"""The vector of forces and how it is filled."""
+"""Residual vector and its assembly."""
 
 from collections.abc import Sequence
 

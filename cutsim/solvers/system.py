@@ -1,4 +1,4 @@
-"""The nonlinear equations as a solver of vectors sees them: unknowns, residual, tangent."""
+"""Nonlinear equations in terms of vectors: unknowns, residual, tangent."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from cutsim.solvers.tangent import Tangent
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """What is known of the equations beside their form.
+    """Structure of the equations beside their form.
 
     Args:
         symmetric: Whether the tangent is symmetric.

@@ -1,4 +1,4 @@
-"""The tangent matrix and how it is filled."""
+"""Tangent matrix and its assembly."""
 
 from collections.abc import Sequence
 

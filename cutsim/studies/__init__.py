@@ -1,1 +1,1 @@
-"""Ready-made problems and what is read off them: the blade cut, fracture parameters."""
+"""Studies: ready-made problems, such as an insertion, and the evaluation of their results."""

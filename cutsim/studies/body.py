@@ -1,4 +1,4 @@
-"""A body with a predefined crack through it, ready to be cut: its solids, the bond, the notch."""
+"""Cracked body, ready to be cut: solids, bond and notch."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ Facets = NDArray[np.int32]
 
 @dataclass(frozen=True)
 class CrackedBody:
-    """Solids on one mesh and the crack through them.
+    """Cracked body: solids on one mesh and the crack through them.
 
     `cracked_block` and `cutsim.studies.layered.LayeredBlock` make one; put together by hand it may be of any material,
     degree and formulation.

@@ -1,4 +1,4 @@
-"""How far a crack has been cut: the area that its law has spent, and the area behind its front."""
+"""Cut area of a crack: by the energy that its law has dissipated, and by its front."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""How a tool is driven: into the notch, then pushed at a constant speed, perhaps drawn back and pushed once more."""
+"""Motion of a pushed tool: into the notch, at constant speed to a depth, and perhaps back and in again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ TIP_IN_NOTCH = 0.8
 @checked
 @dataclass(frozen=True)
 class Drive:
-    """What a user says of the motion of a tool.
+    """Drive of a tool: speed and times, as a user gives them.
 
     Args:
         speed: Speed of the push, > 0 [length/time].
@@ -44,7 +44,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion of a tool in a body: depths and times.
+    """Motion of a tool in a body: depths and times.
 
     In a notch the halves of a tool are spread apart from beside each other, at the depth at which the push begins; a
     whole tool comes from the surface.  Without a notch either comes from a tip radius above the surface.

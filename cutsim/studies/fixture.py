@@ -1,4 +1,4 @@
-"""How a body is held while a tool is pushed into it, and where the tool meets it first."""
+"""Fixture of a body while a tool is pushed into it, and the surface where the tool enters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from cutsim.studies.frame import FLAT, Array, Facets, Frame
 @checked
 @dataclass(frozen=True)
 class Fixture:
-    """Names of groups of a mesh: where the tool meets the body, and what holds it.
+    """Fixture: names of the groups of a mesh where the tool enters and where the body is held.
 
     The body rests on a smooth plate. Where its ends are free it is also held across the crack plane along the line in
     which that meets the plate; in space, without plane of symmetry or walls, also along this line, in its middle.

@@ -1,4 +1,4 @@
-"""Fracture parameters: energy-release rate of a stationary crack, and the closed forms it is compared with.
+"""Fracture parameters: energy-release rate of a stationary crack, and closed forms for comparison.
 
 Energy-release rates are positive when growth along the given direction releases energy.
 """
@@ -26,7 +26,7 @@ ENF_CORRECTION = 0.206
 
 
 class JIntegral:
-    """Rice's J of a crack front as an integral over a domain around it (Shih, Moran and Nakamura 1986).
+    """J-integral of a crack front over a domain around it (Shih, Moran and Nakamura 1986).
 
     J = 1/b ∫ (P : (∇u e ⊗ ∇q) − W e·∇q) dX over the reference configuration, where q falls smoothly from 1 within
     `inner` to 0 beyond `outer`, e is the direction of growth and b the length of the front.  This is minus the

@@ -1,4 +1,4 @@
-"""The frame of a push: where a tool enters a body, which way it goes and which way the crack opens."""
+"""Frame of a push: the point of entry, the direction of the push and that in which the crack opens."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -23,7 +23,7 @@ FLAT = 1e-6
 
 @dataclass(frozen=True)
 class Frame:
-    """A point of the surface and two directions at right angles, in as many components as the mesh has.
+    """Frame of a push: a point of the surface and two orthogonal directions, with as many components as the mesh has.
 
     Everything that depends on how a body lies in space is asked of it.
 

@@ -1,4 +1,4 @@
-"""A blade or a needle pushed into a body along a predefined crack: one ready-made problem (docs/needle_insertion.md).
+"""Insertion of a blade or a needle into a body along a predefined crack (docs/needle_insertion.md).
 
 The body may be one solid or have layers; it may lie in space in any way.
 """
@@ -32,7 +32,7 @@ _SIDES = {1: "right", -1: "left"}
 
 @dataclass(frozen=True)
 class Insertion:
-    """A blade or a needle driven into a body along its crack.
+    """Insertion of a blade or a needle into a body along its crack.
 
     The tool moves along its direction `push`, and is halved in the plane of the crack, whose normal is its direction
     `lateral`: each face of the crack meets a half.  In a body of revolution the face around the thread meets the whole

@@ -1,4 +1,4 @@
-"""What the work of an insertion is spent on: toughness, parts of the force, the experiment with two insertions.
+"""Work of an insertion: toughness, parts of the force, and the experiment with two insertions.
 
 All of it starts from the columns of a run of `cutsim.studies.insertion.Insertion` (docs/needle_insertion.md).
 """
@@ -67,7 +67,7 @@ def steady_force(toughness: float, width: float, stiffness: float = np.inf) -> f
 
 @dataclass(frozen=True)
 class SteadyCut:
-    """A stretch of steady cut by its force and the front of its crack: nothing of it is from the law's books.
+    """Steady cut between two depths, evaluated from the force and the crack front, independent of the energy audit.
 
     Between two steady states all that is stored moves along with the tool.  What the force has spent is then what the
     area swept by the front has cost, and the block below gives back what it was compressed by.

@@ -1,4 +1,4 @@
-"""A block of layers with one crack through all of them, such as skin (docs/skin_layers.md)."""
+"""Layered block with one crack through all layers, such as skin (docs/skin_layers.md)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ _PLUS = (-1.0, 0.0, 0.0)
 @checked
 @dataclass(frozen=True)
 class Layer:
-    """A layer of a block.
+    """Layer of a block.
 
     Args:
         name: Its name in the mesh, in messages and in output.
@@ -70,7 +70,7 @@ def skin(epidermis: CohesiveLaw, dermis: CohesiveLaw, hypodermis: CohesiveLaw) -
 
 @dataclass(frozen=True)
 class LayeredBlock(CrackedBody):
-    """Layers that stick together, each a solid of its own, with one crack through all of them.
+    """Block of layers, each a solid of its own, with one crack through all of them.
 
     Each solid has the name of its layer.  Neighbours with the same law share a part of the crack, which is called
     "crack" if it is the only one, else "crack_" and the name of its first layer.
