@@ -2,7 +2,7 @@
 #
 # A rigid wedge blade is pushed through a silicone specimen along a predefined crack plane: two halves of
 # 30 mm meet in a plane of 10.1 × 4.2 mm, the cutting edge lies along the 10.1 mm, and the specimen rests with
-# its 4.2 mm of thickness on a smooth plate.  This is the cutting test of the thesis (section 5.2.4).
+# its 4.2 mm of thickness on a smooth plate.  This is the cutting test of K. Bronik's thesis (section 5.2.4).
 #
 # ## Model
 #
@@ -15,14 +15,14 @@
 # **The fracture energy.**  The thesis prints a strength of 0.615 MPa with an opening of 0.0061 mm, which gives
 # $G_c = e\,t_n\,\varepsilon = 0.0103$ N/mm, and it also prints $G_c = 277.9$ N/mm.  A steady frictionless cut
 # needs the force $F = G_c\,w$ on an edge of length $w$: 0.1 N for the one and 2800 N for the other, over $w = 10.1$ mm.
-# The force that was measured is not printed; the machine was set to a largest load of 9–10 N.  The default is
-# $G_c = 0.8$ N/mm: 8.1 N for the fracture alone, which leaves room for friction below that load.
+# The measured force is not printed; the machine was set to a largest load of 9–10 N.  The default here is
+# $G_c = 0.8$ N/mm, which needs 8.1 N for the fracture alone and leaves room for friction below that load.
 #
-# **What the force tells.**  A tall block (`--dim 2`) reaches a steady cut, in which $F/w$ itself is the toughness but
-# for the compression of the block below; the demo `steady_cut` has that in space too.  This thin specimen does not
-# become steady.  What its energy audit leaves for the crack, $(\int F\,\mathrm{d}s - \Delta E -
-# \text{losses})/\Delta A$, is the toughness that was put in as soon as the books close: the summary has it as a check
-# of the books, not as a result.
+# **What the force tells.**  A tall block (`--dim 2`) reaches a steady cut, in which $F/w$ is the toughness, apart from
+# the compression of the block below; the demo `steady_cut` has the same in 3-D.  This thin specimen does not become
+# steady.  The energy that the audit leaves for the crack, $(\int F\,\mathrm{d}s - \Delta E - \text{losses})/\Delta A$,
+# equals the toughness that was put in whenever the audit closes.  The summary has it as a check of the audit, not as a
+# result.
 
 import logging
 import time
@@ -198,7 +198,7 @@ def push(
     return summary
 
 
-# ## What came out
+# ## Results
 
 
 def summarise(cut: Insertion, history: History, law: Exponential, seconds: float) -> Summary:
@@ -282,8 +282,8 @@ def draw(cut: Insertion, history: History, law: Exponential, out: Path, temperat
         )
 
 
-# With friction above the tangent of the half angle, 0.2, the faces stick to the blade and are dragged along: little is
-# cut, and what the books leave for the crack is then a small difference of large works.
+# With friction above the tangent of the half angle, 0.2, the faces stick to the blade and are dragged along.  Little is
+# cut, and the energy that the audit leaves for the crack is then a small difference of large numbers.
 
 
 def check(summary: Summary, friction: float, *, steady: bool) -> None:

@@ -1,13 +1,13 @@
-# # What a testing machine knows of a silicone
+# # Identifying a silicone
 #
 # The numbers that a cut needs come from four tests: tension gives the modulus, pairs of lines on the specimen Poisson's
 # ratio, a flat punch the modulus again, and the cut itself toughness and friction.  Here the files of the machine are
-# made by theory or simulation with noise, so that the answers are known.
+# made from theory or simulation with added noise, so that the answers are known.
 #
 # ## Tension
 #
-# A neo-Hookean solid, $P = G(\lambda - \lambda^{-2})$, with $E$ = 0.777 MPa and $\nu$ = 0.48 (thesis, Table 5.1).  The
-# file has the units of the machine and noise of 2 % of the largest force.
+# A neo-Hookean solid, $P = G(\lambda - \lambda^{-2})$, with $E$ = 0.777 MPa and $\nu$ = 0.48 (K. Bronik's thesis,
+# Table 5.1).  The file has the units of the machine and noise of 2 % of the largest force.
 
 import csv
 import logging
@@ -88,18 +88,18 @@ def tension(path: Path, solid: NeoHookean) -> tuple[MaterialFit, float]:
 #
 # The thesis pressed a punch of radius $a$ = 1.6 mm into specimens of $h$ = 4.2 mm and took $P = 4Gad/(1-\nu)$, the
 # formula of a half space, which gives 0.438, 0.447 and 0.271 MPa for $G$ (Table 3.4).  A layer of this thickness is
-# stiffer by $\kappa$ (Lebedev and Ufliand 1958, Hayes et al. 1972), so that the moduli are to be divided by it.  The
-# specimens lay on a metal plate on which they slid freely: the factor is that of a sliding layer, 1.363, not 1.48 to
-# 1.54 as if they had been bonded.  And they were pressed by 3.8 to 4 mm, almost through, where no linear formula holds:
-# what remains of these moduli is their order.
+# stiffer by $\kappa$ (Lebedev and Ufliand 1958, Hayes et al. 1972), so the moduli must be divided by it.  The specimens
+# lay on a metal plate on which they slid freely: the factor is that of a sliding layer, 1.363, not the 1.48 to 1.54 of
+# a bonded one.  Moreover they were pressed by 3.8 to 4 mm, almost through, where no linear formula holds.  Only the
+# order of these moduli can be trusted.
 
 PUNCHED = {0.412096: 0.437557, 0.43174: 0.446646, 0.35874: 0.270886}
 
 # ## The cut
 #
-# Plane strain; force per width against the depth of the tip.  Friction shows from the beginning, toughness once the
-# crack runs: one curve has both.  The cut with noise of 1 % of the largest force is the measurement, and a fit that
-# starts 30 and 50 % away looks for toughness and friction.
+# The cut is in plane strain and gives force per width against the depth of the tip.  Friction acts from the beginning,
+# toughness once the crack runs, so that one curve contains both.  The cut with noise of 1 % of the largest force is the
+# measurement.  A fit that starts 30 and 50 % away finds toughness and friction.
 
 
 @dataclass(frozen=True)
@@ -165,14 +165,14 @@ def inverse(quick: bool, out: Path) -> Fit:
 # ## The four silicones
 #
 # The machine cut the four silicones of the thesis, 10.1 mm wide.  It was *set* to a largest load of 9 to 10 N; the
-# force that was measured is not printed, so that there is nothing here to compare with.  The question is another: up to
+# measured force is not printed, so there is nothing to compare with.  The question here is a different one: up to
 # which toughness can the specimen, 4.2 mm thick and on a plate, be cut by such a load, with the moduli and strengths of
-# Table 5.1?  Friction was not measured, and it matters as much: the answer is for the friction given.  The force is the
-# largest until the tip is 0.2 mm above the plate.  It grows with the toughness only while the crack runs: with the
-# strength fixed a tougher bond opens further before it breaks, and in the end it gives way like a spring.  With
-# friction of 0.1 the second silicone, the softest and weakest, stays below 7 N whatever its toughness.  It takes
-# friction of 0.23, more than the tangent of the half angle, so that the blade drags the surface in, and then the force
-# depends on the mesh: the number is no more than an indication.
+# Table 5.1?  Friction was not measured and matters as much, so each answer holds for the friction given.  The force is
+# the largest until the tip is 0.2 mm above the plate.  It grows with the toughness only while the crack runs: with the
+# strength fixed a tougher bond opens further before it breaks, and in the end it yields like a spring.  With a
+# friction of 0.1 the second silicone, the softest and weakest, stays below 7 N whatever its toughness.  It needs a
+# friction of 0.23, more than the tangent of the half angle.  The blade then drags the surface in and the force depends
+# on the mesh, so this number is no more than an indication.
 
 THIN = BLOCK | {"Lx": 30.0, "H": 4.2}
 FLAT = {True: Specimen(THIN, 4.0, 0.2), False: Specimen(THIN, 4.0, 0.1)}

@@ -3,14 +3,14 @@
 # A needle with a conical tip and a cylindrical shaft is pushed into silicone.  Two models of what the tip does to the
 # material in its way (see the page on needle insertion):
 #
-# - `--dim 2`: a body of revolution.  A crack on the axis would have no area.  What a blunt tip destroys is a thread of
-#   its own width, and the crack is the surface of that thread; the hole is then widened to the shaft's radius.
-# - `--dim 3`: a sharp tip splits the block in a plane through its axis (Shergold and Fleck 2004; thesis 5.2.1), and the
-#   faces wrap around the shaft.  How far the crack goes to either side is a result.
+# - `--dim 2`: a body of revolution.  A crack on the axis would have no area.  A blunt tip destroys a thread of its own
+#   width, and the crack is the surface of that thread; the hole is then widened to the radius of the shaft.
+# - `--dim 3`: a sharp tip splits the block in a plane through its axis (Shergold and Fleck 2004; K. Bronik's thesis,
+#   5.2.1), and the faces wrap around the shaft.  How far the crack goes to either side is a result.
 #
 # The work of the force goes into the deformation of the body, into new surface, and into friction on tip and shaft.
-# Then the needle is drawn back and pushed again along the broken path: what is missing is what the new surface has cost
-# (Azar and Hayward 2008).
+# Then the needle is pulled back and pushed in again along the broken path.  The difference in work is the cost of the
+# new surface (Azar and Hayward 2008).
 
 import logging
 import time
@@ -34,13 +34,13 @@ from cutsim.studies.insertion_work import TwoInsertions, force_parts
 MESHES = Path(__file__).parent.parent / "meshes"
 
 # Silicone 1 of the thesis: Young's modulus [MPa], Poisson's ratio; viscosity [MPa s] at a speed of 1 mm/s, which
-# carries the run across the small jumps of a crack with friction: its share is in the audit.
+# carries the run across the small jumps of a crack with friction; its share is an entry of the energy audit.
 
 YOUNG, POISSON, VISCOSITY = 0.777, 0.48, 0.005
 
 # ## Settings
 #
-# The tip has to be resolved: two to three elements along its radius are worth more than a finer mesh elsewhere.
+# The mesh must resolve the tip: two to three elements along its radius are worth more than a finer mesh elsewhere.
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,7 @@ def problem(setting: Setting, law: Exponential, friction: float, dim: int, turni
     return Insertion.build(body, needle, drive, notch=setting.mesh["notch"], friction=friction)
 
 
-# ## What came out
+# ## Results
 
 
 def summarise(cut: Insertion, history: History, parts: History, law: Exponential, seconds: float) -> Summary:
@@ -213,9 +213,9 @@ def draw(cut: Insertion, out: Path) -> None:
     )  # fmt: skip
 
 
-# With friction the two insertions differ by more than the new surface: what pushes the faces of the crack apart presses
-# on the tip, and so rubs on it, in the first insertion only.  The audit knows that work.  What is left is the toughness
-# if the crack is long against its process zone.
+# With friction the two insertions differ by more than the new surface: the force that opens the crack presses on the
+# tip, and so causes friction on it, in the first insertion only.  The energy audit contains that work.  The rest is the
+# toughness if the crack is long compared with its process zone.
 
 
 def check(summary: Summary, *, long: bool) -> None:

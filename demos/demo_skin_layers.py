@@ -6,24 +6,24 @@
 #
 # ## The layers
 #
-# The models are those of the thesis (section 5.2.1): neo-Hookean epidermis, Ogden's dermis, Mooney–Rivlin fat.  It
-# prints no values; those here are in `cutsim.materials.library` with their sources, and with what in them is assumed.
+# The models are those of K. Bronik's thesis (section 5.2.1): neo-Hookean epidermis, Ogden's dermis, Mooney–Rivlin fat.
+# It prints no values; those here are in `cutsim.materials.library` with their sources and assumptions.
 #
-# **What the cut costs is assumed.**  The toughness found for skin spans orders of magnitude with the tool and its size,
+# **The toughness is assumed.**  The toughness found for skin spans orders of magnitude with the tool and its size,
 # and no source separates the layers.  The values below, 20 and 30 J/m² for epidermis and dermis and 1 J/m² for fat, are
-# of the order that a microscopic penetrator has to spend (see the page on layers).
+# of the order that was found for microscopic penetrators (see the page on layers).
 #
 # ## The cut
 #
-# In plane strain, per millimetre of width.  The far ends of the block are held where the skin goes on; before the cut
-# they are drawn apart by 5 %, since skin on a body is under tension.  This opens the wound and helps the blade.  The
-# fat rests on a smooth plate.  A blade of 12° half angle is spread apart in a notch of 50 µm, which goes through the
-# first three layers, and then pushed at unit speed.
+# The cut is in plane strain, per millimetre of width.  The far ends of the block are held where the skin would
+# continue.  Before the cut they are pulled apart by 5 %, since skin on a body is under tension.  This opens the
+# wound.  The fat rests on a smooth plate.  A blade of 12° half angle is spread apart in a notch of 50 µm, which goes
+# through the first three layers, and then pushed at unit speed.
 #
-# What is to be expected: first the skin bends into the soft fat, until the force is large enough to cut; the force then
-# is of the order of the toughness of the layer at the tip, less what the tension of the skin gives.  That a layer whose
-# bond has broken has taken its toughness times its thickness is so by the law and whatever the mechanics: the run ends
-# with it as a check of the books.
+# First the skin bends into the soft fat, until the force is large enough to cut.  The force is then of the order of the
+# toughness of the layer at the tip, less the contribution of the tension of the skin.  A layer whose bond has broken
+# has dissipated its toughness times its thickness, which follows from the law whatever the mechanics; the run ends
+# with this as a check of the energy audit.
 
 import logging
 import time
@@ -54,8 +54,8 @@ STRETCH = 0.05  # of the skin before the cut
 DAMPING = 0.003  # Kelvin–Voigt viscosity over Young's modulus [s], at a cutting speed of 1 mm/s
 TOUGHNESS = {"epidermis": 0.02, "dermis": 0.03, "hypodermis": 0.001}  # [N/mm]
 
-# The openings at which the laws peak, 2.5 elements and for fat ten, keep the strength below the stiffness and let the
-# mesh resolve the zone in which the layers come apart.
+# The openings at which the laws have their maximum, 2.5 elements and ten for fat, keep the strength below the stiffness
+# and let the mesh resolve the process zone.
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def push(cut: Insertion, until: float, size: float, out: Path) -> Recording:
     return recording
 
 
-# ## What came out
+# ## Results
 
 
 def summarise(cut: Insertion, history: History, seconds: float) -> Summary:

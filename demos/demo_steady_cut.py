@@ -1,31 +1,31 @@
 # # A steady cut: the toughness from force and front alone
 #
-# A balance of energy gives back the toughness that was put in, whatever the mechanics, as long as its books close.
-# What a simulated cut is worth shows where the law's books have no say: in the *force* on the tool, and in the *place*
+# An energy audit that closes returns the toughness that was put in, whatever the mechanics.  A real test of a simulated
+# cut uses quantities that do not contain the energies of the cohesive law: the *force* on the tool and the *position*
 # of the crack front.
 #
-# ## What is known
+# ## What theory says
 #
-# A strip stands on a smooth plate, its sides are free.  A rigid smooth blade splits it along its middle.  Once the cut
-# is steady everything that is stored moves along with the tool, and the force per width of the edge is the toughness,
+# A strip stands on a smooth plate, and its sides are free.  A rigid smooth blade splits it along its middle.  Once the
+# cut is steady, all stored energy moves along with the tool, and the force per width of the edge is the toughness,
 #
 # $$ F = G_c\,w, $$
 #
-# but for one thing: what is not yet cut carries the force down to the plate and is shorter by $\varepsilon = F/S$, with
-# $S = EA$ the stiffness of the section (in plane strain $EA/(1-\nu^2)$).  Per way of the tool the front therefore runs
-# through $1+\varepsilon$ of the reference configuration, and the strip gives back $\tfrac12 F\varepsilon$:
+# with one correction.  The uncut part carries the force down to the plate and is shortened by $\varepsilon = F/S$, with
+# the stiffness $S = EA$ of the section (in plane strain $EA/(1-\nu^2)$).  Per displacement of the tool the front
+# therefore advances by $1+\varepsilon$ in the reference configuration, and the strip releases $\tfrac12 F\varepsilon$:
 #
 # $$ F\left(1+\tfrac{\varepsilon}{2}\right) = G_c\,w\,(1+\varepsilon), \qquad
 # \frac{A_\mathrm{swept}}{w\,\Delta s} = 1+\varepsilon. $$
 #
-# From this follow three numbers that can fail, in plane strain and in space, each on two meshes:
+# From this follow three checks, in plane strain and in 3-D, each on two meshes:
 #
-# 1. the mean force of the steady stretch against this closed form;
-# 2. force × way over the area swept by the front between two depths, which is to be $G_c$, and that area itself;
-# 3. the work of a first insertion less that of a second along the broken path (Azar and Hayward 2008), to the lower end
-#    of the stretch and to the upper one; the difference of the two over width × depth × $(1+\varepsilon)$.
+# 1. the mean force of the steady cut against this closed form;
+# 2. the work of the force over the area swept by the front between two depths, which should be $G_c$, and that area;
+# 3. the work of a first insertion less that of a second along the broken path (Azar and Hayward 2008), to the lower
+#    depth and to the upper one; the difference of the two over width × depth × $(1+\varepsilon)$.
 #
-# There is no friction, and a trace of viscosity only: it carries coarse meshes across the jumps of the front from node
+# There is no friction, and only a trace of viscosity.  It carries coarse meshes across the jumps of the front from node
 # to node, and adds 0.1 to 0.3 % to the force.
 
 import logging
@@ -146,9 +146,9 @@ def push(strip: Strip, depth: float, out: Path, twice: bool) -> tuple[Insertion,
     return cut, recording.columns()
 
 
-# ## What came out
+# ## Results
 #
-# The closed forms know toughness and section; force, front and work know nothing of the cohesive law's energies.
+# The closed forms use toughness and section; force, front and work do not contain the energies of the cohesive law.
 
 
 def expected(strip: Strip) -> tuple[float, float]:
