@@ -290,7 +290,7 @@ def check(summary: Summary, friction: float, *, steady: bool) -> None:
     """The headline numbers, asserted."""
     given, booked = summary["toughness_given"], summary["toughness_in_the_books"]
     if friction < np.tan(HALF_ANGLE):
-        assert abs(booked / given - 1) < 0.03, f"{booked} in the books, given {given}"
+        assert abs(booked / given - 1) < 0.03, f"{booked} by the audit, given {given}"
     assert summary["largest_closure"] < 0.01
     assert summary["largest_imbalance"] < 1e-6
     assert summary.get("largest_heat_closure", 0.0) < 1e-6

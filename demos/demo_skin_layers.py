@@ -225,7 +225,7 @@ def plot_layers(block: LayeredBlock, history: History, path: Path) -> None:
 
 
 def check(cut: Insertion, summary: Summary, history: History) -> None:
-    """The force in the dermis, once there is a stretch of it, and the books."""
+    """The steady force in the dermis, and the energy audit."""
     depth, force = history["depth"], history["force"]
     steady = (depth > 0.75) & (depth < 0.95)
     if depth[-1] > 1.0:

@@ -4,7 +4,7 @@ from cutsim.base.log import collective_logger
 
 logger = collective_logger(__name__)
 
-#: What may be missing in books of energy or heat, relative to their largest turnover.
+#: Allowed gap of an audit of energy or heat, relative to its largest turnover.
 CLOSURE = 0.02
 
 

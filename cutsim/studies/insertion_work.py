@@ -19,7 +19,7 @@ History = Mapping[str, Array]
 
 
 def audited_toughness(history: History, start: float, end: float, symmetry_factor: float) -> float:
-    """What the energy audit leaves for the crack, (∫F ds − ΔE − losses)/ΔA: a check of the books [force/length].
+    """Toughness as the rest of the energy audit, (∫F ds − ΔE − losses)/ΔA: a check of the audit [force/length].
 
     ΔE is what body and contact hold, losses are friction and viscosity, and ΔA, the growth of the column `cut`, counts
     each point by the share of its work that the cohesive law has spent.  If the audit closes, this is the toughness
