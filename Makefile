@@ -43,7 +43,7 @@ lint: $(STAMP) ## ruff and mypy
 	$(PYTHON_IN_VENV) -m ruff check .
 	$(PYTHON_IN_VENV) -m mypy
 
-$(DOCS_STAMP): $(STAMP)
+$(DOCS_STAMP): pyproject.toml $(STAMP)
 	$(PYTHON_IN_VENV) -m pip install --quiet --disable-pip-version-check -c .venv/constraints.txt -e '.[docs]'
 	@touch $@
 
