@@ -1,7 +1,7 @@
 """What the theory tests share: two blocks glued by a crack, their rigid motion, and slopes of remainders."""
 
 import gc
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mpi4py.MPI  # noqa: F401  # before dolfinx, as in cutsim
 import numpy as np
@@ -98,7 +98,8 @@ def make_blocks(gdim=2, n=2, comm=MPI.COMM_WORLD, cell=None):
 def remember(crack, opening, sliding=0.0):
     """Let the bond of a crack have been open and slid so far at all points."""
     secants = np.minimum(crack.law.secants(0.0, 0.0), crack.law.secants(opening, sliding))
-    crack.points.set(crack.history.secants, np.broadcast_to(secants, (*crack.points.weights.shape, 2)))
+    known = crack.history._known
+    known.set(replace(known.committed, secants=np.broadcast_to(secants, known.committed.secants.shape)))
 
 
 def rotation(gdim, angle):

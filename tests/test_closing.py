@@ -8,7 +8,7 @@ from test_sliding import Assembled, two, wavy
 from test_tangents import assert_slope_two, jump_part, smooth
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.stepping import StepControl, begin
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
@@ -148,7 +148,6 @@ def test_tangent_of_a_closing_crack(gdim, friction):
     shift[gdim - 1] = APART
     b.move(lambda x: 0 * x, lambda x: shift + 0 * x)
     term.evaluate()
-    term.commit()
     b.state.commit()
     shift[0], shift[gdim - 1] = 0.05, -DEPTH
     b.move(lambda x: 0 * x, lambda x: shift + 0 * x)
@@ -164,11 +163,10 @@ def test_tangent_of_a_closing_pair(gdim, friction):
     shift = np.zeros((3, 1))
     shift[gdim - 1] = APART
     b.move(lambda x: shift + 0 * x, 1)
-    term.begin(1.0)
+    term.begin()
     term.evaluate()
-    term.commit()
     b.state.commit()
-    term.begin(2.0)
+    term.begin()
     shift[0], shift[gdim - 1] = 0.05, -0.1
     b.move(lambda x: shift + 0 * x, 1)
     u, w = b.state.u.x.array + wavy(b.state.V, 2, 0.01), wavy(b.state.V, 3, 0.02)
@@ -188,10 +186,10 @@ def test_closing_leaves_no_trace_when_given_up():
     history(mechanics, 1.25, StepControl.fixed(0.25))
     slip = mechanics.terms[1].passes[0].slip
     before = slip._memory.x.array.copy()
-    mechanics.begin(2.0)
+    begin(mechanics, 2.0)
     assert mechanics.solve().converged
     mechanics.evaluate()
     assert slip.dissipation().min() > 0
-    mechanics.rollback()
+    mechanics.state.rollback()
     np.testing.assert_array_equal(slip._memory.x.array, before)
     assert not slip.dissipation().any()

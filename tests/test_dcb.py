@@ -116,7 +116,7 @@ def test_ranks_agree_with_one():
 def test_failed_steps_are_cut_and_leave_no_trace(monkeypatch):
     beam = Beam.build(SMALL)
     mechanics, state, crack = beam.mechanics, beam.state, beam.crack
-    solve, rollback = mechanics.solve, mechanics.rollback
+    solve, rollback = mechanics.solve, state.rollback
     committed = []
 
     def failing(line_search=None):
@@ -124,20 +124,20 @@ def test_failed_steps_are_cut_and_leave_no_trace(monkeypatch):
         if state.time - state.time_old < 0.6 * SMALL.step or not 0.1 < state.time < 0.15:
             return outcome
         committed.append(
-            [a.copy() for a in (state.u_old.x.array, crack.history.secants.x.array, mechanics._residual_old)]
+            [a.copy() for a in (state.u_old.x.array, crack.history.secants.x.array, mechanics._residual.committed)]
         )
         state.u.x.array[:] = np.nan
         return replace(outcome, converged=False, message="made to fail")
 
     def rolling_back():
         rollback()
-        now = [state.u.x.array, crack.history.secants.x.array, mechanics._residual_old]
+        now = [state.u.x.array, crack.history.secants.x.array, mechanics._residual.committed]
         if committed:
             assert all(np.array_equal(a, b) for a, b in zip(now, committed.pop(), strict=True))
             committed.clear()
 
     monkeypatch.setattr(mechanics, "solve", failing)
-    monkeypatch.setattr(mechanics, "rollback", rolling_back)
+    monkeypatch.setattr(state, "rollback", rolling_back)
     history = pull(beam, SMALL)
     assert history["cuts"].sum() >= 2
     undisturbed = pull(Beam.build(SMALL), SMALL)

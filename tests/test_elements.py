@@ -13,7 +13,7 @@ from test_sliding import Stack, stack
 from test_tangents import assert_slope_two, jump_part, smooth
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl, run
+from cutsim.analysis.stepping import StepControl, begin, run
 from cutsim.base.assembly import integrate
 from cutsim.base.compat import cell_partitioner, form
 from cutsim.bodies.loads import Pressure, Support, Traction
@@ -362,7 +362,7 @@ def test_taylor_slope(kind):
         else Solid(state, NeoHookean(E, 0.3), relaxation=relaxation)
     )
     state.begin(0.1)
-    term.begin(0.1)
+    term.begin()
     u = smooth(state.V, 1, 0.1)
     u[::2] = np.where(np.isclose(state.V.tabulate_dof_coordinates()[:, 0], 0), 0.0, u[::2])
     assert_slope_two(term, state, u, 0.3)
@@ -481,24 +481,25 @@ KINDS = [(2, 1, False), (2, 2, False), (2, 2, True), (3, 1, False)]
 def test_tangent_of_mixed_elements(kind):
     """Taylor slope 2, symmetry, and the same action with and without matrix."""
     state, solid = mixed(*kind)
+    (assembler,) = solid.assemblers
     u, w = state.u.x.array.copy(), smooth(state.V, 7, 1.0)
     residual = solid.residual(ufl.TestFunction(state.V))
     forces, tangent = form(residual), form(ufl.derivative(residual, state.u, ufl.TrialFunction(state.V)))
 
     def vector(h):
         state.u.x.array[:] = u + h * w
-        solid.prepare()
+        assembler.prepare()
         return fem.assemble_vector(forces).array
 
     start = vector(0.0)
     A, added = petsc.assemble_matrix(tangent), PETSc.Mat().createDense(2 * [len(u)], comm=MPI.COMM_SELF)
     added.setUp()
-    solid.add_tangent(added)
+    assembler.add_tangent(added)
     A.assemble()
     added.assemble()
     matrix, more = A[:, :], added[:, :]
     action = added.createVecLeft()
-    solid.add_forces(action, along=w)
+    assembler.add_forces(action, along=w)
     action.assemble()
     np.testing.assert_allclose(action.array, more @ w, atol=1e-12 * np.abs(more @ w).max())
     matrix = matrix + more
@@ -532,11 +533,11 @@ def test_rollback_of_pressure_and_mixed_elements():
     u, books = m.state.u.x.array.copy(), m.record()
     results = []
     for time in (1.0, 0.75, 0.75):
-        m.begin(time)
+        begin(m, time)
         assert m.solve("l2").converged
         m.evaluate()
         results.append(m.state.u.x.array.copy())
-        m.rollback()
+        m.state.rollback()
         np.testing.assert_array_equal(m.state.u.x.array, u)
         assert m.record() == books
     np.testing.assert_allclose(results[1], results[2], rtol=1e-9)

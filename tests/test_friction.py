@@ -7,7 +7,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl, run
+from cutsim.analysis.stepping import StepControl, begin, run
 from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
@@ -144,16 +144,16 @@ def test_stuck_interface_turns(gdim, steps):
         b.move(lambda x: R @ x - x, lambda x: R @ (x + shift) - x)
         b.state.begin(b.state.time_old + 1)
         mechanics.evaluate()
-        mechanics.commit()
+        mechanics.state.commit()
         return friction.slip.values("traction").copy(), R
 
     before, _ = place(0.0)
-    force = mechanics._residual.reshape(-1, gdim).copy()
+    force = mechanics._residual.trial.reshape(-1, gdim).copy()
     np.testing.assert_allclose(np.linalg.norm(before, axis=-1), TANGENTIAL * np.linalg.norm(shift[: gdim - 1]))
     for i in range(steps):
         after, R = place((i + 1) * np.pi / 2 / steps)
     np.testing.assert_allclose(after, before, atol=1e-8 * np.abs(before).max(initial=1e-9))
-    turned = mechanics._residual.reshape(-1, gdim)
+    turned = mechanics._residual.trial.reshape(-1, gdim)
     np.testing.assert_allclose(turned, force @ R[:gdim, :gdim].T, atol=1e-10)
     assert friction.slip.energies()["friction"] == 0.0
 
@@ -277,15 +277,15 @@ def test_rollback_restores_the_slip(stick):
     mechanics, friction = elastic_blocks(stick)
     history(mechanics, 0.4, StepControl.fixed(0.2))
     before = friction.slip._memory.x.array.copy()
-    values = {name: v.copy() for name, v in friction.slip._trial.items()}
-    mechanics.begin(0.8)
+    values = {name: v.copy() for name, v in friction.slip._known.trial.items()}
+    begin(mechanics, 0.8)
     assert mechanics.solve().converged
     mechanics.evaluate()
     assert friction.dissipation().max(initial=1.0) > 0
-    mechanics.rollback()
+    mechanics.state.rollback()
     np.testing.assert_array_equal(friction.slip._memory.x.array, before)
     for name, v in values.items():
-        np.testing.assert_array_equal(friction.slip._trial[name], v)
+        np.testing.assert_array_equal(friction.slip._known.trial[name], v)
 
 
 @pytest.mark.mpi

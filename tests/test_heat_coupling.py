@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from conftest import NU, E, history, make_blocks
+from coupled_run import coupled
 from dolfinx import fem, mesh
 from mpi4py import MPI
 from scipy.optimize import brentq
@@ -11,7 +12,7 @@ from test_tangents import assert_slope_two, smooth
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
-from cutsim.analysis.stepping import StepControl, run
+from cutsim.analysis.stepping import StepControl, begin, run
 from cutsim.base.compat import cell_partitioner
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
@@ -21,9 +22,8 @@ from cutsim.fields.temperature import Temperature
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.interface_heat import InterfaceHeat
-from cutsim.heat.loads import Convection, PrescribedTemperature
+from cutsim.heat.loads import PrescribedTemperature
 from cutsim.heat.transfer import HeatTransfer
-from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb
@@ -270,27 +270,7 @@ def test_friction_falls_with_temperature():
 
 @pytest.mark.mpi
 def test_all_books_close():
-    """Inertia, viscosity, a bond that breaks in shear, friction on what is broken, expansion and all kinds of heat."""
-    b = make_blocks(2, 4)
-    T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
-    expansion = ThermoElastic(1e-4, 300.0, softening=-1e-3)
-    law = Exponential.from_parameters(toughness=4e-4, opening=0.01, shear_toughness=2e-4, shear_opening=0.02)
-    crack = b.crack(law, contact=PenaltyContact(50.0))
-    friction = CrackFriction(crack, Coulomb(0.3, stiffness=100.0))
-    solid = b.solid(
-        NeoHookean(E, NU), thermoelastic=expansion, temperature=T, density=0.01, viscosity=0.01, volumetric="full"
-    )
-    times = (0.0, 1.0, 4.0)
-    supports = [Support(b.state, b.face(1, 0.0), i) for i in range(2)]
-    supports.append(
-        Support(b.state, b.face(1, 1.0), 1, lambda t: np.interp(t, times, (0, -0.02, -0.02)), corners=(1.0,))
-    )
-    supports.append(Support(b.state, b.face(1, 1.0), 0, lambda t: np.interp(t, times, (0, 0, 0.1))))
-    mechanics = Mechanics(b.state, [solid, crack, friction], supports, analysis="dynamic")
-    body = HeatBody(T, capacity=0.2, conductivity=0.5, body=solid)
-    contact = InterfaceHeat(T, crack, ContactHeat(3.0, 1.0, capacity=1e-3, fracture_fraction=0.9), friction)
-    heat = HeatTransfer(T, [body, contact, Convection(T, b.face(0, 0.0), 0.01, 290.0)])
-    rows = history(ThermoMechanics(mechanics, heat), 4.0, StepControl.fixed(0.02))
+    rows = history(coupled(), 4.0, StepControl.fixed(0.02))
     assert np.abs(rows["energy_closure"]).max() < 0.01
     assert np.abs(rows["heat_closure"]).max() < 1e-9
     for name in ("energy_kinetic", "energy_fracture", "energy_friction", "energy_viscous", "energy_thermoelastic"):
@@ -319,11 +299,11 @@ def test_rollback_is_bit_for_bit():
     problem = rubbing(law=ContactHeat(3.0, 1.0, capacity=0.5))
     run(problem, 2.0, StepControl.fixed(0.25))
     arrays, numbers, columns = snapshot(problem)
-    problem.begin(2.7)
+    begin(problem, 2.7)
     assert problem.solve().converged
     problem.evaluate()
     assert problem.heat.trial_audit != numbers[2]
-    problem.rollback()
+    problem.state.rollback()
     after = snapshot(problem)
     for a, b in zip(arrays, after[0], strict=True):
         np.testing.assert_array_equal(a, b)
@@ -338,10 +318,10 @@ def test_a_rejected_step_leaves_no_trace():
         problem = rubbing(law=ContactHeat(3.0, 1.0, capacity=0.5))
         run(problem, 2.0, StepControl.fixed(0.25))
         if attempt:
-            problem.begin(2.9)
+            begin(problem, 2.9)
             problem.solve()
             problem.evaluate()
-            problem.rollback()
+            problem.state.rollback()
         run(problem, 2.5, StepControl.fixed(0.25))
         ends.append(problem.heat.temperature.value.x.array.copy())
     np.testing.assert_allclose(ends[0], ends[1], rtol=1e-13)

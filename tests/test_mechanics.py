@@ -11,7 +11,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl, run
+from cutsim.analysis.stepping import StepControl, begin, run
 from cutsim.base.assembly import integrate
 from cutsim.base.compat import form
 from cutsim.bodies.loads import Support, Traction
@@ -65,11 +65,11 @@ def test_newton_converges_quadratically():
     """In every step, with large strain, softening, contact and regularised friction."""
     mechanics = pried_and_pressed(petsc_options=DIRECT, tolerances=Tolerances(rtol=1e-14))
     for time in np.linspace(0.1, 1.0, 10):
-        mechanics.begin(time)
+        begin(mechanics, time)
         outcome = mechanics.solve("basic")
         assert outcome.converged
         mechanics.evaluate()
-        mechanics.commit()
+        mechanics.state.commit()
         r = np.array(outcome.residuals)
         r = r[r > 2e-14]  # the rest is rounding
         assert np.log(r[-1] / r[-2]) / np.log(r[-2] / r[-3]) > 1.8, f"t = {time:.1f}: {outcome.residuals}"
@@ -109,10 +109,10 @@ def test_two_boxes_of_the_thesis():
     """The forces of its own program to six figures, residuals and energies that fall at least as fast as it prints."""
     mechanics, forces = two_boxes(), []
     for time in np.linspace(0.1, 1.0, 10):
-        mechanics.begin(time)
+        begin(mechanics, time)
         outcome = mechanics.solve("basic")
         mechanics.evaluate()
-        mechanics.commit()
+        mechanics.state.commit()
         r = np.array(outcome.residuals)
         assert len(r) <= len(TABLE)
         assert np.all(r[2:] / r.max() <= TABLE[2 : len(r)]), outcome.residuals
@@ -164,7 +164,7 @@ def test_multipliers_let_go_when_the_crack_opens_again():
 
 def test_contact_that_does_not_settle_is_refused():
     mechanics, _ = pressed(1e-14, 1e-2)
-    mechanics.begin(0.5)
+    begin(mechanics, 0.5)
     outcome = mechanics.solve()
     assert not outcome.converged
     assert "augmentations" in outcome.message

@@ -269,7 +269,8 @@ def touch(b, shape, place, surfaces, friction):
     before = np.array(place) + np.eye(len(place))[0] * 0.05
     path = Path.polyline([0.0, 1.0], [before, place])
     tool = ToolContact(b.state, shape, path, surfaces, contact=CONTACT, friction=friction)
-    tool.begin(1.0)
+    b.state.begin(1.0)
+    tool.begin()
     return tool
 
 

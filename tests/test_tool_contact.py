@@ -7,7 +7,7 @@ from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.stepping import StepControl, begin
 from cutsim.base.assembly import moment
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
@@ -49,7 +49,7 @@ def test_tool_balances_the_supports(gdim):
     assert force[-1].min() >= 0, "the body pushes the tool up"
     assert force[0, -1] < 0, "friction holds the tool back"
     state = mechanics.state
-    mechanics.begin(2.1)
+    begin(mechanics, 2.1)
     assert mechanics.solve().converged
     mechanics.evaluate()
     residual = mechanics.problem.residual()

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from test_sliding import LINE_SEARCHES, STEPS, Assembled, wavy
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.stepping import StepControl, begin
 from cutsim.base.assembly import moment
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
@@ -208,7 +208,8 @@ def test_tangent(gdim, degree, friction):
     mechanics, tool = indented(gdim, ball(gdim, 1), path, 4, degree, friction, MPI.COMM_SELF, search=0.5)
     state = mechanics.state
     state.u_old.x.array[:] = wavy(state.V, 1, 0.01)
-    tool.begin(1.0)
+    state.begin(1.0)
+    tool.begin()
     u, w = wavy(state.V, 1, 0.01) + wavy(state.V, 2, 0.01), wavy(state.V, 3, 0.02)
     problem = Assembled(tool, state)
     f, slope = problem.forces(u), problem.matrix(u) @ w
@@ -226,18 +227,22 @@ def test_rollback():
 
     def memory():
         arrays = [mechanics.state.u.x.array, tool.position.value, tool.force(), tool.moment(), tool.displacement]
-        arrays += [*tool.touch.history.trial.values(), list(tool.energies().values()), tool.touch.kinematics._slid]
+        arrays += [
+            *tool.touch.history.trial.values(),
+            list(tool.energies().values()),
+            tool.touch.kinematics._known.trial.slid,
+        ]
         arrays += [tool.touch.slip.values(name) for name in ("slip", "traction", "dissipated")]
         return [np.array(a) for a in arrays]
 
     before = memory()
     ends = []
     for end in (1.7, 1.6, 1.7):
-        mechanics.begin(end)
+        begin(mechanics, end)
         assert mechanics.solve("bt").converged
         mechanics.evaluate()
         ends.append(tool.force())
-        mechanics.rollback()
+        mechanics.state.rollback()
         for one, other in zip(before, memory(), strict=True):
             np.testing.assert_array_equal(one, other)
     np.testing.assert_allclose(ends[0], ends[2], rtol=1e-9)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 from types import SimpleNamespace
 
 import numpy as np
@@ -162,12 +163,12 @@ def test_a_run_that_ends_early_is_marked(tmp_path, error):
 
     def record(report):
         recording(report)
+        if report.number == 1 and error is Interrupted:
+            signal.raise_signal(signal.SIGINT)  # asked for after the next step
         if report.number == 2:
             if error is RuntimeError:
                 raise error("no more")
-            if error is Interrupted:
-                report.interrupted = True
-            else:
+            if error is StepError:
                 mechanics.solve = lambda line_search=None: SimpleNamespace(converged=False, message="", iterations=1)
 
     with pytest.raises(error), Recording(folder, mechanics, 1.0, every=0) as recording:

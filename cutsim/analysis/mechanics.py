@@ -1,4 +1,4 @@
-"""Mechanics of one step: the sum of the terms, the tangent, and the energy audit of a trial step."""
+"""The balance of momentum of one step: the terms added up, and the energy audit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -6,39 +6,47 @@ from itertools import chain, count
 from typing import Any, Literal
 
 import numpy as np
-import ufl
 from dolfinx import cpp, la
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.analysis.energy import EnergyAudit
-from cutsim.analysis.mobility import extent, free_motion
+from cutsim.analysis.mobility import extent
+from cutsim.analysis.motion import Dynamic, Motion, QuasiStatic
 from cutsim.base.assembly import global_dot
 from cutsim.base.checks import require
-from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
-from cutsim.base.terms import Term
+from cutsim.base.terms import (
+    Augmenting,
+    Body,
+    Bonded,
+    Columns,
+    Damaging,
+    Energetic,
+    Interface,
+    Joining,
+    Loading,
+    Objecting,
+    Observer,
+    RateDependent,
+    Term,
+    offering,
+)
 from cutsim.base.verdict import CLOSURE
 from cutsim.bodies.inertia import Inertia
-from cutsim.bodies.loads import Load, Support
+from cutsim.bodies.loads import Support
 from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
-from cutsim.bodies.solid import Solid
-from cutsim.fields.constraints import Constraints
-from cutsim.fields.crack_checks import doubt_gaps
+from cutsim.fields.crack_checks import check_cracks
 from cutsim.fields.state import State
 from cutsim.fields.twins import unjoined
-from cutsim.interface.crack import Crack
-from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.solvers.balance import Balance
 from cutsim.solvers.convergence import TOLERANCES, Criteria, Tolerances
 from cutsim.solvers.iterations import Outcome
-from cutsim.solvers.newton import NonlinearProblem
-from cutsim.solvers.system import Structure
 
 # displacement over the size of the mesh at which a solve is given up
 _RUNAWAY = 100.0
 # difference of two prescribed displacements over that size that is none
 _ROUNDING = 1e-12
-# growth of the turnover in a step from which on nothing is said aloud: the books have just begun
+# growth of the turnover in a step from which on nothing is said aloud: the audit has just begun
 _BEGUN = 2.0
 #: What a viscosity may take of the energy that is lost.
 VISCOUS = 0.01
@@ -49,13 +57,14 @@ AUGMENTATIONS = 30
 _prefixes = chain(["cut_"], (f"cut{n}_" for n in count(2)))
 
 
-class Mechanics:
+class Mechanics(Balance[Term, Support]):
     """Mechanical problem of solids, cracks, tools and loads, quasi-static or dynamic.
 
     Args:
         state: Displacement and time.
         terms: Terms of the virtual work.
         supports: Prescribed displacements.
+        observers: What watches the terms without adding to the balance; evaluated after them.
         analysis: "quasi-static" or "dynamic"; the latter adds the inertia of the solids, each of which needs a density.
         scheme: Time integration of a dynamic analysis; the trapezoidal rule by default.
         mass: "consistent" or "lumped", see `cutsim.bodies.inertia`.
@@ -65,7 +74,8 @@ class Mechanics:
         tolerances: When a state is in equilibrium, by residual and, if asked for, displacement and energy.
 
     Attributes:
-        inertia: Velocity, acceleration and momentum; None if quasi-static.
+        supports: Prescribed displacements.
+        motion: What a dynamic analysis adds.
 
     Raises:
         ValueError: There is no term, two terms or supports share a name, two supports prescribe different displacements
@@ -79,6 +89,7 @@ class Mechanics:
         terms: Sequence[Term],
         supports: Sequence[Support] = (),
         *,
+        observers: Sequence[Observer] = (),
         analysis: Literal["quasi-static", "dynamic"] = "quasi-static",
         scheme: Scheme = TRAPEZOIDAL,
         mass: Literal["consistent", "lumped"] = "consistent",
@@ -86,56 +97,39 @@ class Mechanics:
         petsc_options_prefix: str | None = None,
         tolerances: Tolerances = TOLERANCES,
     ) -> None:
-        names = [t.name for t in terms] + [s.name for s in supports if s.name]
         require("terms", len(terms), len(terms) > 0, "at least one term")
-        require("names", names, len(set(names)) == len(names), "different for all terms and supports")
-        self.state, self._static, self.supports = state, tuple(terms), tuple(supports)
-        solids = [t for t in terms if isinstance(t, Solid)]
-        self.inertia = Inertia(state, solids, scheme, mass) if analysis == "dynamic" else None
-        self.terms: tuple[Term, ...] = self._static if self.inertia is None else (*terms, self.inertia)
-        size = extent(state.mesh.comm, state.mesh.geometry.x)
-        self._constraints = Constraints(state.V, supports, "supports", _ROUNDING * size)
-        self._constraints.check(state.time)
-        self._parts: tuple[Term | Support, ...] = (*self.terms, *supports)
-        if cracks := [t for t in terms if isinstance(t, Crack)]:
-            _check_one_law(state, cracks)
-            facets = np.unique(np.concatenate([c.points.facets for c in cracks])).astype(np.int32)
-            doubt_gaps(state.mesh, facets, " and ".join(c.name for c in cracks), state.verdict)
-        v = ufl.TestFunction(state.V)
-        interfaces = [t for t in terms if isinstance(t, Crack | SurfacePair)]
-        self.problem = NonlinearProblem(
-            sum((t.residual(v) for t in self.terms), start=ufl.Form([])),
+        self.supports, self._observers = tuple(supports), tuple(observers)
+        self.motion: Motion = QuasiStatic(state, terms)
+        if analysis == "dynamic":
+            self.motion = Dynamic(Inertia(state, offering(terms, Body), scheme, mass), terms, supports)
+        interfaces, size = offering(terms, Interface), extent(state.mesh.comm, state.mesh.geometry.x)
+        check_cracks(state, offering(terms, Bonded))
+        super().__init__(
+            "mechanics",
+            state,
             state.u,
-            bcs=[s.bc for s in supports],
-            entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
-            structure=Structure(
-                symmetric=all(t.symmetric for t in terms),
-                terms=[t for t in terms if t.assembles],
-                multipliers=[m for t in terms for m in t.multipliers],
-                interface_dofs=self._interface_nodes(interfaces) if interfaces else None,
-            ),
+            terms if self.inertia is None else [*terms, self.inertia],
+            supports,
+            kind="supports",
+            rounding=_ROUNDING * size,
+            interface_dofs=_interface_nodes(state, interfaces) if interfaces else None,
             criteria=Criteria(tolerances, largest=_RUNAWAY * size, by_start=self.inertia is not None),
             petsc_options=petsc_options,
             petsc_options_prefix=next(_prefixes) if petsc_options_prefix is None else petsc_options_prefix,
         )
-        self.audit = self._trial_audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
-        self._apart = unjoined(state.mesh, [t.facets for t in terms if isinstance(t, SurfacePair)])
+        self._apart = unjoined(state.mesh, [t.facets for t in offering(terms, Joining)])
         if self._apart:
             state.verdict.doubt("mesh", f"mesh: {self._apart}")
-        self._begun = self._moved = False
-        self._residual: NDArray[np.float64] = np.zeros(len(state.increment))
-        self._residual_old: NDArray[np.float64] = self._residual
-        self._rate_forces = self._rate_forces_old = np.zeros_like(self._residual)
+        audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
+        self._audit = state.memory.value("mechanics: audit", audit)
+        self._rate_forces = state.memory.value("mechanics: rate forces", np.zeros(len(state.increment)))
+        self._begun = state.memory.value("mechanics: begun", False)
+        self._moved = state.memory.value("mechanics: moved", False)
 
     @property
-    def fields(self) -> Mapping[str, Expr]:
-        """Fields of the terms for output, by name, such as the velocity of a dynamic analysis."""
-        return {name: field for t in self.terms for name, field in t.fields.items()}
-
-    @property
-    def corners(self) -> tuple[float, ...]:
-        """Times at which a path, load or prescribed velocity has a kink."""
-        return tuple(sorted({c for part in self._parts for c in part.corners}))
+    def inertia(self) -> Inertia | None:
+        """Velocity, acceleration and momentum; None if quasi-static."""
+        return self.motion.inertia
 
     def check(self) -> None:
         """Refuse a static problem in which a body is free to move. Collective.
@@ -143,62 +137,33 @@ class Mechanics:
         Raises:
             ValueError: A piece of a body can move as a rigid body, and nothing resists at the committed state.
         """
-        if self.inertia is not None:
-            return
-        bodies = {t.name: t.cells for t in self.terms if isinstance(t, Solid)}
-        motion = free_motion(self.state, self.problem.fixed, self.problem.resistance, bodies)
-        if motion is not None:
-            raise ValueError(
-                f"{motion}: neither a support nor a bond nor a closed contact holds it. Add a Support, let the "
-                "surfaces overlap a little where a contact is to hold it, or use analysis='dynamic'"
-                + (f". In the mesh {self._apart}" if self._apart else "")
-            )
+        self.motion.check(self.problem, self._apart)
 
-    def begin(self, time: float) -> None:
-        """Start a trial step that ends at `time`. Collective.
+    def start(self, end: float) -> None:
+        """Take over the committed state, if no step has begun yet. Collective.
+
+        Args:
+            end: Time at which the first step ends.
+        """
+        if self._begun.committed:
+            return
+        self._begun.set(True)
+        forces = self.motion.start(self.problem, self._out_of_balance, end)
+        if forces is not None:
+            self._residual.set(forces)
+            self._audit.set(self.audit.start(self._energies()))
+
+    def begin(self) -> None:
+        """Start the trial step that the state has begun. Collective.
 
         Constants move. The displacement stays, or with inertia goes on at the present velocity.
         """
-        if self.inertia is not None and not self.inertia.started:
-            self._start(self.inertia, time)
-        elif self.inertia is None and not self._begun:
-            self._take_over()
-        self._begun = True
-        self.state.begin(time)
-        for part in self._parts:
-            part.begin(time)
-        self._constraints.check(time)
-        if self.inertia is not None:
-            self.problem.known[:] = self.inertia.history(self._residual_old)
+        super().begin()
+        self.problem.known[:] = self.motion.known(self._residual.committed)
 
     def predict(self) -> None:
         """Start the search for equilibrium where the last step leads; with inertia the velocity does so already."""
-        if self.inertia is None:
-            self.state.predict()
-
-    def _take_over(self) -> None:
-        """Forces and energies of a static state that others have loaded, or that was set."""
-        u = self.state.u_old.x.array
-        if self.state.mesh.comm.allreduce(bool(u.any()), MPI.LOR):
-            self._residual = self._residual_old = self._out_of_balance()
-            self.audit = self._trial_audit = self.audit.start([t.energies() for t in self.terms])
-
-    def _start(self, inertia: Inertia, end: float) -> None:
-        """Motion, forces and energies at the start of a dynamic analysis whose first step ends at a time."""
-        for term in self._static:
-            term.evaluate()
-            term.commit()
-        for support in self.supports:
-            inertia.prescribe(support.dofs, *support.rates(self.state.time, end))
-        static = self._out_of_balance()
-        self._residual = self._residual_old = inertia.start(static, self.problem.bcs, self.problem.fixed)
-        self.audit = self._trial_audit = self.audit.start([t.energies() for t in self.terms])
-
-    def _out_of_balance(self) -> NDArray[np.float64]:
-        residual = self.problem.residual()
-        forces = residual.array_r.copy()
-        residual.destroy()
-        return forces
+        self.motion.predict()
 
     def solve(self, line_search: str | None = None) -> Outcome:
         """Find equilibrium, with contact augmentations, that no term objects to. Collective.
@@ -206,134 +171,102 @@ class Mechanics:
         Args:
             line_search: "l2", "bt" or "basic"; the solver's default if None.
         """
-        outcome = self.problem.solve(line_search)
+        outcome = super().solve(line_search)
         for _ in range(AUGMENTATIONS):
             # every term takes part: a list, because any() would stop at the first
-            if not outcome.converged or not any([t.augment() for t in self.terms]):
+            if not outcome.converged or not any([t.augment() for t in offering(self.terms, Augmenting)]):
                 break
-            outcome = self.problem.solve(line_search).after(outcome)
+            outcome = super().solve(line_search).after(outcome)
         else:
             message = f"contact not settled by {AUGMENTATIONS} augmentations"
             outcome = replace(outcome, converged=False, message=message)
-        if outcome.converged and (objections := [why for t in self.terms if (why := t.objection())]):
-            outcome = replace(outcome, converged=False, message="; ".join(objections))
+        if outcome.converged:
+            objections = [why for t in offering(self.terms, Objecting) if (why := t.objection())]
+            if objections:
+                outcome = replace(outcome, converged=False, message="; ".join(objections))
         return outcome
 
     def evaluate(self) -> None:
         """Trial history, energies and reactions of the converged trial state. Collective."""
-        for term in self.terms:
-            term.evaluate()
-        fixed = self.problem.fixed
-        self._residual = self._out_of_balance()
-        if self.inertia is not None:
-            self._residual = self.inertia.balance(self._residual, self._residual_old, ~fixed)
-        rates = [forces for t in self._static if (forces := t.rate_forces()) is not None]
-        self._rate_forces = np.sum([np.zeros_like(self._residual), *rates], axis=0)
-        mean = 0.5 * (self._residual + self._residual_old)
+        for part in (*self.terms, *self._observers):
+            part.evaluate()
+        fixed, old = self.problem.fixed, self._residual.committed
+        residual = self.motion.forces(self._out_of_balance(), old, ~fixed)
+        rates = [forces for t in offering(self.terms, RateDependent) if (forces := t.rate_forces()) is not None]
+        rate_forces = np.sum([np.zeros_like(residual), *rates], axis=0)
+        mean = 0.5 * (residual + old)
         if self._jerks():  # what follows the velocity has its value at the end of the step from its beginning on
-            mean += 0.5 * (self._rate_forces - self._rate_forces_old)
+            mean += 0.5 * (rate_forces - self._rate_forces.committed)
         work = global_dot(self.state.mesh.comm, mean[fixed], self.state.increment[fixed])
-        work += sum(t.external_work() for t in self.terms)
-        self._trial_audit = self.audit.advance(work, [t.energies() for t in self.terms])
+        work += sum((t.external_work() for t in offering(self.terms, Loading)), start=0.0)
+        self._residual.trial, self._rate_forces.trial, self._moved.trial = residual, rate_forces, True
+        self._audit.trial = self.audit.advance(work, self._energies())
+
+    def _energies(self) -> list[dict[str, float]]:
+        return [t.energies() for t in offering(self.terms, Energetic)]
 
     def _jerks(self) -> bool:
         """Whether prescribed velocities may jump at the start of the step: at rest before it, or at a corner."""
-        return not self._moved or self.state.time_old in self.corners
+        return not self._moved.committed or self.state.time_old in self.corners
+
+    @property
+    def audit(self) -> EnergyAudit:
+        """Energy audit of the committed state."""
+        return self._audit.committed
 
     @property
     def trial_audit(self) -> EnergyAudit:
         """Energy audit including the trial step."""
-        return self._trial_audit
+        return self._audit.trial
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
-        return max(t.damage_increment() for t in self.terms)
+        return max((t.damage_increment() for t in offering(self.terms, Damaging)), default=0.0)
 
     def watch(self) -> None:
         """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
-        for term in self.terms:
-            term.watch()
-        self._watch_books()
+        super().watch()
+        self._watch_audit()
 
-    def _watch_books(self) -> None:
-        """Doubt books that do not close, and a viscosity that takes part in what is lost."""
-        verdict, audit, entries = self.state.verdict, self._trial_audit, self._trial_audit.entries
+    def _watch_audit(self) -> None:
+        """Doubt an audit that does not close, and a viscosity that takes part in what is lost."""
+        verdict, audit, entries = self.state.verdict, self.trial_audit, self.trial_audit.entries
         verdict.withdraw("closure")
         if audit.worst_closure > CLOSURE:
             words = f"{audit.worst_closure:.1%} of the energy is missing in the audit: smaller steps are needed"
             verdict.suppose("closure", words, aloud=audit.scale < _BEGUN * self.audit.scale)
         lost = entries["fracture"] + entries["friction"]
-        viscous = sum(t.viscous_work for t in self.terms if isinstance(t, Solid))
+        viscous = sum((b.viscous_work for b in offering(self.terms, Body)), start=0.0)
         verdict.withdraw("viscosity")
         if lost > 0 and viscous > VISCOUS * (lost + viscous):
             # before anything breaks it is all of it: what counts is how much it is in the end
             share = viscous / (lost + viscous)
             verdict.suppose("viscosity", f"the viscosity takes {share:.1%} of the energy that is lost")
 
-    def diagnose(self) -> str:
-        """After a failed solve: what is wrong and where, in words. Collective."""
-        return "; ".join(words for t in self.terms if (words := t.diagnose()))
+    def reaction(self, held: Support) -> float:
+        """Reaction of a support along its direction in the trial state [force]. Collective."""
+        return held.sign * super().reaction(held)
 
     def advise(self) -> str:
         """What may be tried where no step succeeds, in words; empty if nothing is known."""
-        loads = [t.name for t in self.terms if isinstance(t, Load)]
-        if not loads or self.inertia is not None:
-            return ""
-        return (
-            f"there may be no equilibrium under more of {', '.join(loads)} (a limit point): prescribe a displacement "
-            "instead of the load, or use analysis='dynamic'"
-        )
+        return self.motion.advise()
 
-    def reaction(self, support: Support) -> float:
-        """Reaction of a support along its direction in the trial state [force]. Collective."""
-        return support.sign * self._constraints.reaction(support, self._residual)
-
-    def record(self) -> dict[str, tuple[float, str]]:
+    def record(self) -> Columns:
         """Columns of the history row: name → (value, kind of quantity). Collective."""
-        columns: dict[str, tuple[float, str]] = {}
-        for term in self.terms:
-            columns |= term.record()
-        for support in self.supports:
-            if support.name:
-                columns[f"{support.name}_displacement"] = (support.displacement, "length")
-                columns[f"{support.name}_force"] = (self.reaction(support), "force")
-        return columns | self._trial_audit.record()
-
-    def rollback(self) -> None:
-        """Give the trial step up: displacement, constants and multipliers as before, bit for bit."""
-        self.state.rollback()
-        for term in self.terms:
-            term.rollback()
-        for support in self.supports:
-            support.begin(self.state.time)
-        self._trial_audit, self._residual = self.audit, self._residual_old
-        self._rate_forces = self._rate_forces_old
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-        for term in self.terms:
-            term.commit()
-        self.state.commit()
-        self.audit, self._residual_old = self._trial_audit, self._residual
-        self._rate_forces_old, self._moved = self._rate_forces, True
-
-    def _interface_nodes(self, interfaces: Sequence[Crack | SurfacePair]) -> NDArray[np.int32]:
-        """Owned nodes on both faces of all cracks and pairs of surfaces."""
-        dofmap, tdim = self.state.V.dofmap, self.state.mesh.topology.dim
-        facets = cpp.mesh.cell_num_entities(self.state.mesh.topology.cell_type, tdim - 1)
-        closure = [dofmap.dof_layout.entity_closure_dofs(tdim - 1, f) for f in range(facets)]
-        marks = la.vector(dofmap.index_map, 1)
-        for interface in interfaces:
-            for cell, facet in interface.entities.reshape(-1, 2):
-                marks.array[dofmap.cell_dofs(cell)[closure[facet]]] = 1.0
-        marks.scatter_reverse(la.InsertMode.add)
-        return np.flatnonzero(marks.array[: dofmap.index_map.size_local]).astype(np.int32)
+        columns = super().record()
+        for observer in self._observers:
+            columns |= observer.record()
+        return columns | self.trial_audit.record()
 
 
-def _check_one_law(state: State, cracks: Sequence[Crack]) -> None:
-    """Refuse two cracks on one facet, whose laws would add up. Collective."""
-    for i, one in enumerate(cracks):
-        for other in cracks[i + 1 :]:
-            both = state.mesh.comm.allreduce(len(np.intersect1d(one.points.facets, other.points.facets)))
-            if both:
-                raise ValueError(f"cracks {one.name!r} and {other.name!r} share {both} facets: each facet has one law")
+def _interface_nodes(state: State, interfaces: Sequence[Interface]) -> NDArray[np.int32]:
+    """Owned nodes on both faces of all cracks and pairs of surfaces."""
+    dofmap, tdim = state.V.dofmap, state.mesh.topology.dim
+    facets = cpp.mesh.cell_num_entities(state.mesh.topology.cell_type, tdim - 1)
+    closure = [dofmap.dof_layout.entity_closure_dofs(tdim - 1, f) for f in range(facets)]
+    marks = la.vector(dofmap.index_map, 1)
+    for interface in interfaces:
+        for cell, facet in interface.entities.reshape(-1, 2):
+            marks.array[dofmap.cell_dofs(cell)[closure[facet]]] = 1.0
+    marks.scatter_reverse(la.InsertMode.add)
+    return np.flatnonzero(marks.array[: dofmap.index_map.size_local]).astype(np.int32)

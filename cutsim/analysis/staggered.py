@@ -67,6 +67,11 @@ class ThermoMechanics:
         """Energy audit of the mechanics including the trial step."""
         return self.mechanics.trial_audit
 
+    def refresh(self) -> None:
+        """Forget what the solvers have factorised. Collective."""
+        self.mechanics.refresh()
+        self.heat.refresh()
+
     def check(self) -> None:
         """Refuse a problem in which a body is free to move. Collective."""
         self.mechanics.check()
@@ -75,9 +80,13 @@ class ThermoMechanics:
         """What may be tried where no step succeeds, in words."""
         return self.mechanics.advise()
 
-    def begin(self, time: float) -> None:
-        """Start a trial step that ends at `time`."""
-        self.mechanics.begin(time)
+    def start(self, end: float) -> None:
+        """Take over the committed state, if no step has begun yet. Collective."""
+        self.mechanics.start(end)
+
+    def begin(self) -> None:
+        """Start the trial step that the state has begun. Collective."""
+        self.mechanics.begin()
 
     def predict(self) -> None:
         """Start the search for equilibrium from where the last step leads."""
@@ -102,7 +111,7 @@ class ThermoMechanics:
             if not isfinite(self.mechanics.trial_audit.closure):
                 return replace(outcome, converged=False, message="no admissible equilibrium")
             before = self.heat.temperature.value.x.array.copy()
-            self.heat.begin(self.state.time)
+            self.heat.begin()
             thermal = self.heat.solve()
             if not thermal.converged:
                 return replace(thermal, message=f"heat: {thermal.message}")
@@ -135,13 +144,3 @@ class ThermoMechanics:
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity). Collective."""
         return self.mechanics.record() | self.heat.record()
-
-    def rollback(self) -> None:
-        """Give the trial step up, bit for bit."""
-        self.mechanics.rollback()
-        self.heat.rollback()
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-        self.mechanics.commit()
-        self.heat.commit()

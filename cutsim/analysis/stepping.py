@@ -7,7 +7,7 @@ history → accept or reject → commit, record.
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from types import FrameType
 from typing import Literal, Protocol
@@ -77,14 +77,20 @@ class Problem(Protocol):
     def trial_audit(self) -> Audit:
         """Audit including the trial step."""
 
+    def refresh(self) -> None:
+        """Forget what solvers have factorised. Collective."""
+
     def check(self) -> None:
         """Refuse, before anything is solved, what has no solution. Collective."""
 
     def advise(self) -> str:
         """What may be tried where no step succeeds, in words; empty if nothing is known."""
 
-    def begin(self, time: float) -> None:
-        """Start a trial step that ends at `time`."""
+    def start(self, end: float) -> None:
+        """Take over the committed state, if no step has begun yet; the first one ends at `end`. Collective."""
+
+    def begin(self) -> None:
+        """Start the trial step that the state has begun. Collective."""
 
     def predict(self) -> None:
         """Start the search for the trial state from where the last step leads."""
@@ -107,21 +113,68 @@ class Problem(Protocol):
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity). Collective."""
 
-    def rollback(self) -> None:
-        """Give the trial step up, bit for bit."""
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-
 
 class StepError(RuntimeError):
     """Raised when no step of the smallest allowed size succeeds; the recorded history stays readable."""
 
 
+@dataclass(frozen=True)
+class StepReport:
+    """One step that was tried.
+
+    Attributes:
+        number: Its number: steps accepted so far, this one included.
+        time: Time at its end [time].
+        dt: Its size [time].
+        outcome: What the solver did.
+        damage: Largest growth of damage at a point [–].
+        drift: What the energy audit misses by it, over the largest turnover so far [–].
+        refusal: Why it is not accepted, in words; None if it is.
+        cuts: Attempts that were rejected since the last accepted step.
+        corner: Whether it ends at a corner of a path or load, or at the end of the run.
+        interrupted: Whether a signal ended the run after it.
+        columns: History columns, name → (value, kind of quantity).
+    """
+
+    number: int
+    time: float
+    dt: float
+    outcome: Outcome
+    damage: float = 0.0
+    drift: float = 0.0
+    refusal: str | None = None
+    cuts: int = 0
+    corner: bool = False
+    interrupted: bool = False
+    columns: dict[str, tuple[float, str]] = field(default_factory=dict)
+
+
+class Control(Protocol):
+    """How large steps are, and which are accepted; a value, of which `StepControl` is one."""
+
+    @property
+    def first(self) -> float:
+        """First step [time]."""
+
+    @property
+    def smallest(self) -> float:
+        """Step below which the run gives up [time]."""
+
+    @property
+    def line_searches(self) -> tuple[str, ...]:
+        """Line searches tried in turn for the same step."""
+
+    def accept(self, report: StepReport) -> str | None:
+        """Why a step that was solved is not accepted, in words; None if it is."""
+
+    def next(self, report: StepReport) -> float:
+        """Size of the next step, after one that was accepted or not [time]."""
+
+
 @checked
 @dataclass(frozen=True)
 class StepControl:
-    """Step control: sizes of the steps, and limits on them.
+    """Step control: steps that grow while they are easy, and are cut where they fail.
 
     Args:
         first: First step, and the first one after each corner of a path [time].
@@ -170,28 +223,22 @@ class StepControl:
         require_number("step", step, positive)
         return cls(first=step, largest=step)
 
+    def accept(self, report: StepReport) -> str | None:
+        """Refuse a step in which damage grows too much, or the energy audit does not close."""
+        if self.damage is not None and report.damage > self.damage:
+            return f"damage grows by {report.damage:.3g}, more than {self.damage:g}"
+        if self.closure is not None and report.drift > self.closure:
+            return f"energy closure changes by {report.drift:.2g}, more than {self.closure:g}"
+        return None
 
-@dataclass
-class StepReport:
-    """Report of an accepted step, for recorders.
-
-    Attributes:
-        number: Steps accepted so far.
-        time: Time at its end [time].
-        dt: Its size [time].
-        outcome: What the solver did.
-        cuts: Rejected attempts since the previous accepted step.
-        interrupted: Whether a signal ended the run after this step.
-        columns: History columns, name → (value, kind of quantity).
-    """
-
-    number: int
-    time: float
-    dt: float
-    outcome: Outcome
-    cuts: int
-    interrupted: bool = False
-    columns: dict[str, tuple[float, str]] = field(default_factory=dict)
+    def next(self, report: StepReport) -> float:
+        """Grow after an easy step, cut one that failed and keep its size, start anew at a corner."""
+        if report.refusal is not None:
+            return self.cut * report.dt
+        if report.corner:
+            return self.first
+        easy = not report.cuts and report.outcome.iterations <= self.easy
+        return min(report.dt * self.growth if easy else report.dt, self.largest)
 
 
 class Interrupted(KeyboardInterrupt):
@@ -215,7 +262,7 @@ Recorder = Callable[[StepReport], None]
 def run(
     problem: Problem,
     until: float,
-    control: StepControl,
+    control: Control,
     record: Recorder = lambda _: None,
     stop: Callable[[StepReport], bool] = lambda _: False,
     *,
@@ -245,16 +292,13 @@ def run(
     state = problem.state
     require_number("until", until, above(state.time_old, "the present time").or_inf)
     problem.check()
-    corners = [c for c in (*problem.corners, until) if c <= until]
-    dt, report, number = control.first, None, 0
-    smooth = False  # whether the last step tells where the next one leads
+    corners, report = [c for c in (*problem.corners, until) if c <= until], None
+    if state.pace.committed is None or state.pace.committed.control != control:
+        state.pace.set(Pace(control, control.first))
     with _interruptible(state.mesh.comm) as interrupted:
         while ahead := [c for c in corners if c > state.time_old + _ROUNDING * control.smallest]:
-            corner = min(ahead)
-            report = _advance(problem, control, dt, corner, predict=smooth)
-            number += 1
-            report.number = number
-            report.interrupted = interrupted()
+            report = _advance(problem, control, min(ahead))
+            report = replace(report, interrupted=interrupted())
             record(report)
             if report.interrupted:
                 words = f"interrupted at time {report.time:.6g} of {until:.6g}"
@@ -265,45 +309,71 @@ def run(
                 break
             if stop(report):
                 break
-            at_corner = state.time_old == corner
-            dt = _next_step(control, report, dt, at_corner=at_corner)
-            smooth = not at_corner and not report.cuts
     logger.info("the run to time %.6g is %s", state.time_old, state.verdict)
     return report
 
 
-def _advance(problem: Problem, control: StepControl, dt: float, corner: float, *, predict: bool) -> StepReport:
-    """One accepted step of at most dt that does not pass the corner; its first try may be predicted."""
+@dataclass(frozen=True)
+class Pace:
+    """What is known of the next step.
+
+    Attributes:
+        control: The control that has chosen its size.
+        size: Its size [time].
+        smooth: Whether the last step tells where it leads.
+    """
+
+    control: Control
+    size: float
+    smooth: bool = False
+
+
+def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
+    """One accepted step that does not pass the corner; its first try may be predicted."""
     state, cuts = problem.state, 0
+    pace: Pace = state.pace.committed
+    size = pace.size
     while True:
         start = state.time_old
-        end = corner if start + (1 + _SLIVER) * dt >= corner else start + dt
-        outcome, refusal = _attempt(problem, control, end, predict=predict and not cuts)
-        if refusal is None:
-            size = end - start
-            if cuts and control.cut * size < control.smallest:
-                state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
-            problem.watch()
-            problem.commit()
-            return StepReport(0, end, size, outcome, cuts, columns=problem.record())
-        problem.rollback()
-        cuts += 1
-        dt = control.cut * (end - start)
-        logger.info("step to %.6g rejected (%s); next try %.3g", end, refusal, dt)
-        if dt < control.smallest:
-            problem.state.verdict.doubt("ended", f"no step succeeds from time {start:.6g} on")
-            raise StepError(
-                f"no step from time {start:.6g} of {dt / control.cut:.3g} or more succeeds "
-                f"(smallest = {control.smallest:.3g}): {refusal}"
-                + (f". {advice}" if (advice := problem.advise()) else "")
-            )
+        end = corner if start + (1 + _SLIVER) * size >= corner else start + size
+        report = replace(_attempt(problem, control, end, predict=pace.smooth and not cuts), cuts=cuts)
+        if report.refusal is None:
+            return _accept(problem, control, replace(report, corner=end == corner), size)
+        state.rollback()
+        size, cuts = control.next(report), cuts + 1
+        logger.info("step to %.6g rejected (%s); next try %.3g", end, report.refusal, size)
+        if size < control.smallest:
+            raise _no_step(problem, control, report)
 
 
-def _attempt(problem: Problem, control: StepControl, end: float, *, predict: bool) -> tuple[Outcome, str | None]:
-    """Solve the step to `end`; the outcome, and why it is refused, None if it is accepted."""
+def _accept(problem: Problem, control: Control, report: StepReport, size: float) -> StepReport:
+    """Commit a step; the next one follows the size that was asked for, not what was left before a corner."""
+    state, start = problem.state, report.time - report.dt
+    if report.cuts and control.next(replace(report, refusal="")) < control.smallest:
+        state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
+    problem.watch()
+    following = control.next(replace(report, dt=size))
+    state.pace.trial = Pace(control, following, smooth=not report.corner and not report.cuts)
+    state.commit()
+    return replace(report, columns=problem.record())
+
+
+def _no_step(problem: Problem, control: Control, report: StepReport) -> StepError:
+    """The end of a run in which no step succeeds."""
+    start, advice = problem.state.time_old, problem.advise()
+    problem.state.verdict.doubt("ended", f"no step succeeds from time {start:.6g} on")
+    return StepError(
+        f"no step from time {start:.6g} of {report.dt:.3g} or more succeeds "
+        f"(smallest = {control.smallest:.3g}): {report.refusal}" + (f". {advice}" if advice else "")
+    )
+
+
+def _attempt(problem: Problem, control: Control, end: float, *, predict: bool) -> StepReport:
+    """Solve the step to `end`."""
+    state = problem.state
     for retry, line_search in enumerate(control.line_searches):
-        problem.rollback()
-        problem.begin(end)
+        state.rollback()
+        begin(problem, end)
         predicted = predict and not retry
         if predicted:
             problem.predict()
@@ -313,15 +383,18 @@ def _attempt(problem: Problem, control: StepControl, end: float, *, predict: boo
             failure = "the start from the last step's rate leads to another equilibrium"
         if failure is None:
             break
-    else:
-        return outcome, failure
-    growth = problem.damage_increment()
-    if control.damage is not None and growth > control.damage:
-        return outcome, f"damage grows by {growth:.3g}, more than {control.damage:g}"
-    drift = _drift(problem)
-    if control.closure is not None and drift > control.closure:
-        return outcome, f"energy closure changes by {drift:.2g}, more than {control.closure:g}"
-    return outcome, None
+    report = StepReport(state.number, end, end - state.time_old, outcome, refusal=failure)
+    if failure is not None:
+        return report
+    report = replace(report, damage=problem.damage_increment(), drift=_drift(problem))
+    return replace(report, refusal=control.accept(report))
+
+
+def begin(problem: Problem, end: float) -> None:
+    """Start a trial step that ends at a time: the only place where the clock is moved. Collective."""
+    problem.start(end)
+    problem.state.begin(end)
+    problem.begin()
 
 
 def _drift(problem: Problem) -> float:
@@ -340,16 +413,6 @@ def _failure(problem: Problem, outcome: Outcome) -> str | None:
     why = "no admissible equilibrium" if outcome.converged else outcome.message
     where = problem.diagnose()
     return f"{why} after {outcome.iterations} iterations" + (f"; {where}" if where else "")
-
-
-def _next_step(control: StepControl, report: StepReport, dt: float, *, at_corner: bool) -> float:
-    """Grow after an easy step, keep the size of a cut one, start anew at a corner."""
-    if at_corner:
-        return control.first
-    size = min(dt, report.dt) if report.cuts else dt
-    if not report.cuts and report.outcome.iterations <= control.easy:
-        size *= control.growth
-    return min(size, control.largest)
 
 
 @contextmanager

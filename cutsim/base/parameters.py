@@ -10,6 +10,7 @@ from dolfinx import default_scalar_type, fem
 from dolfinx.mesh import Mesh
 
 from cutsim.base.checks import finite, require, require_number
+from cutsim.base.memory import Memory
 
 Law = TypeVar("Law")
 History = Callable[[float], float]
@@ -99,8 +100,10 @@ class Schedule:
 
     Args:
         mesh: Mesh of the forms.
+        memory: Memory of the run.
         value: A number, or a function of time.
         name: Name of the parameter as the user wrote it.
+        owner: Name of what it belongs to.
 
     Attributes:
         constant: The constant, at first with the value at time 0.
@@ -109,9 +112,10 @@ class Schedule:
         ValueError: The value, or that of the function at a time, is not a finite number.
     """
 
-    def __init__(self, mesh: Mesh, value: float | History, name: str) -> None:
+    def __init__(self, mesh: Mesh, memory: Memory, value: float | History, name: str, owner: str) -> None:
         self._value, self._name = value, name
         self.constant = fem.Constant(mesh, default_scalar_type(self._at(0.0)))
+        memory.array(f"{owner}: {name}", self.constant)
 
     @property
     def value(self) -> float:

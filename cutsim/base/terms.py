@@ -1,16 +1,18 @@
-"""Terms of the virtual work, and what they contribute to a step.
+"""Terms of a balance, and what they contribute to a step.
 
 The object that owns a term writes it: its form, its moving constants, its history and its share of the energy audit.
-`cutsim.analysis.mechanics` only adds terms up.
+Balances only add terms up.  `Term` is what every term is.  What only some can do are protocols of their own: a class
+takes part in them by having their members.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -22,6 +24,78 @@ ENTRIES = (
     "strain", "kinetic", "thermoelastic", "cohesive_stored", "contact",  # stored
     "fracture", "friction", "viscous", "numerical",  # lost
 )  # fmt: skip
+
+#: Columns of a history row: name → (value, kind of quantity).
+Columns = dict[str, tuple[float, str]]
+
+
+class Assembler(Protocol):
+    """Forces that are no form, with their tangent."""
+
+    @property
+    def pattern(self) -> int:
+        """Number of the sparsity pattern, the same on all ranks; another one asks for another matrix."""
+
+    def prepare(self) -> None:
+        """Bring coefficients of forms to the present displacement, before each assembly. Collective."""
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None) -> None:
+        """Add the forces at the present displacement. Collective.
+
+        Args:
+            b: Vector of the owned dofs; the caller assembles it afterwards.
+            along: Displacement of the local dofs, ghosts included, times which the tangent is added, too.
+        """
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Add the tangent of these forces; the caller assembles the matrix afterwards. Collective."""
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros wherever `add_tangent` may add something, as long as the `pattern` is the same. Collective."""
+
+
+class Term:
+    """A term of a balance; every member but `residual` has a neutral default.
+
+    Attributes:
+        name: Name in messages and in the columns of the history.
+        symmetric: Whether the tangent of the term is symmetric.
+    """
+
+    name: str = "term"
+    symmetric: bool = True
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Internal minus external virtual work along a test function, as far as it is a form."""
+        raise TypeError(f"{type(self).__name__} has to write its virtual work")
+
+    @property
+    def assemblers(self) -> Sequence[Assembler]:
+        """The forces of the term that are no form."""
+        return ()
+
+    @property
+    def entity_maps(self) -> EntityMaps:
+        """Maps from mesh entities to the cells of submeshes on which coefficients of the term live."""
+        return {}
+
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Times the stepping has to meet exactly."""
+        return ()
+
+    def begin(self) -> None:
+        """Move constants to their value at the end of the step that the state has begun. Collective."""
+
+    def evaluate(self) -> None:
+        """Compute trial history and energies from the solved trial state. Collective."""
+
+    def watch(self) -> None:
+        """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
+
+    def record(self) -> Columns:
+        """Columns of the history row. Collective."""
+        return {}
 
 
 @dataclass(frozen=True)
@@ -37,154 +111,189 @@ class Multiplier:
     equation: ufl.Form
 
 
-class Term:
-    """A term of the virtual work; every method but `residual` has a neutral default.
-
-    Attributes:
-        name: Name in messages and in the columns of the history.
-        symmetric: Whether the tangent of the term is symmetric.
-        assembles: Whether the term has forces that are no form: it then adds them, and their tangent, by itself.
-    """
-
-    name: str = "term"
-    symmetric: bool = True
-    assembles: bool = False
-
-    def residual(self, v: Expr) -> ufl.Form:
-        """Internal minus external virtual work."""
-        raise TypeError(f"{type(self).__name__} has to write its virtual work")
-
-    @property
-    def entity_maps(self) -> EntityMaps:
-        """Maps from mesh entities to the cells of submeshes on which coefficients of the term live."""
-        return {}
-
-    @property
-    def multipliers(self) -> Sequence[Multiplier]:
-        """Unknowns of the term beside the displacement, with their equations."""
-        return ()
-
-    @property
-    def fields(self) -> Mapping[str, Expr]:
-        """Fields of the term for output, by name."""
-        return {}
-
-    def prepare(self) -> None:
-        """Bring coefficients of forms to the present displacement; for terms that assemble, before each assembly."""
-
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
-        """Add forces that are no form, at the present displacement. Collective.
-
-        Args:
-            b: Vector of the owned dofs; the caller assembles it afterwards.
-            along: Displacement of the local dofs, ghosts included, times which the tangent is added, too.
-        """
-
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add the tangent of these forces; the caller assembles the matrix afterwards. Collective."""
-
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros wherever `add_tangent` may add something, as long as the `pattern` is the same. Collective."""
-
-    @property
-    def pattern(self) -> int:
-        """Number of the sparsity pattern, the same on all ranks; another one asks for another matrix."""
-        return 0
-
-    @property
-    def corners(self) -> tuple[float, ...]:
-        """Times the stepping has to meet exactly."""
-        return ()
-
-    def begin(self, time: float) -> None:
-        """Move constants to their value at the end of the step."""
-
-    def augment(self) -> bool:
-        """Improve a multiplier after equilibrium; True if the step has to be solved again. Collective."""
-        return False
-
-    def objection(self) -> str | None:
-        """After equilibrium: why the trial state cannot be the end of this step, in words, or None. Collective."""
-        return None
-
-    def evaluate(self) -> None:
-        """Compute trial history and energies from the converged trial displacement. Collective."""
+@runtime_checkable
+class Energetic(Protocol):
+    """A term with energies in the audit."""
 
     def energies(self) -> dict[str, float]:
-        """Trial value of the audit entries this term contributes to [energy]. Collective."""
-        return {}
+        """Trial value of the audit entries this term contributes to, see `ENTRIES` [energy]. Collective."""
 
-    def rate_forces(self) -> NDArray[np.float64] | None:
-        """The part of the forces in the trial step that jumps with the velocity, owned entries. Collective."""
-        return None
+
+@runtime_checkable
+class Loading(Protocol):
+    """A term through which external work enters."""
 
     def external_work(self) -> float:
-        """External work that enters through this term in the trial step [energy]. Collective."""
-        return 0.0
+        """External work of the trial step [energy]. Collective."""
+
+
+@runtime_checkable
+class RateDependent(Protocol):
+    """A term with forces that jump with the velocity."""
+
+    def rate_forces(self) -> NDArray[np.float64] | None:
+        """These forces in the trial step, owned entries; None if there are none. Collective."""
+
+
+@runtime_checkable
+class Augmenting(Protocol):
+    """A term with a multiplier that is improved after equilibrium."""
+
+    def augment(self) -> bool:
+        """Improve it; True if the step has to be solved again. Collective."""
+
+
+@runtime_checkable
+class Objecting(Protocol):
+    """A term that may refuse an equilibrium."""
+
+    def objection(self) -> str | None:
+        """Why the trial state cannot be the end of this step, in words, or None. Collective."""
+
+
+@runtime_checkable
+class Damaging(Protocol):
+    """A term with damage."""
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step [–]. Collective."""
-        return 0.0
 
-    def watch(self) -> None:
-        """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
+
+@runtime_checkable
+class Constrained(Protocol):
+    """A term with unknowns of its own."""
+
+    @property
+    def multipliers(self) -> Sequence[Multiplier]:
+        """Unknowns beside that of the balance, with their equations."""
+
+
+@runtime_checkable
+class Showing(Protocol):
+    """A term with fields for output."""
+
+    @property
+    def fields(self) -> Mapping[str, Expr]:
+        """Fields by name."""
+
+
+@runtime_checkable
+class FacetShowing(Protocol):
+    """A term with fields on facets for output.
+
+    Attributes:
+        name: Its name.
+    """
+
+    name: str
+
+    @property
+    def submesh(self) -> Mesh:
+        """Mesh of the facets."""
+
+    @property
+    def facet_fields(self) -> tuple[str, ...]:
+        """Names of the fields, none if there is nothing to show."""
+
+    def facet_mean(self, name: str) -> NDArray[np.float64]:
+        """Mean of a field over each local facet."""
+
+
+@runtime_checkable
+class Diagnosing(Protocol):
+    """A term that can say what goes wrong."""
 
     def diagnose(self) -> str | None:
         """After a failed solve: what is wrong in this term, in words, or None. Collective."""
-        return None
-
-    def record(self) -> dict[str, tuple[float, str]]:
-        """Columns of the history row: name → (value, kind of quantity). Collective."""
-        return {}
-
-    def rollback(self) -> None:
-        """Forget the trial step: constants back to the committed time."""
-
-    def commit(self) -> None:
-        """Adopt trial history."""
 
 
-class Assembler(Protocol):
-    """A part of a term that adds forces by itself; its methods are those of `Term`."""
+@runtime_checkable
+class Advising(Protocol):
+    """A term that may be why a quasi-static problem has no solution."""
 
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None) -> None:
-        """As `Term.add_forces`."""
-
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """As `Term.add_tangent`."""
-
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """As `Term.add_pattern`."""
+    def advise(self) -> str:
+        """What may be tried where no step succeeds, in words."""
 
 
-P = TypeVar("P", bound=Assembler)
-
-
-class AssembledTerm(Term, Generic[P]):
-    """A term all of whose forces are those of its passes, none of them a form.
+@runtime_checkable
+class Body(Protocol):
+    """A term that gives cells their stiffness.
 
     Attributes:
-        passes: What adds the forces.
+        name: Its name.
+        cells: Local cells (ghosts allowed); None for all.
+        density: Mass per reference volume; None if it was not given [mass/length³].
     """
 
-    assembles = True
-    passes: Sequence[P]
+    name: str
+    cells: NDArray[np.int32] | None
+    density: float | None
 
-    def residual(self, v: Expr) -> ufl.Form:
-        """No form: see `add_forces`."""
-        return ufl.Form([])
+    @property
+    def viscous_work(self) -> float:
+        """Work of a viscosity that may only help the solver, up to the trial state [energy]."""
 
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
-        """Add the forces of all passes. Collective."""
-        for p in self.passes:
-            p.add_forces(b, along)
 
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add their derivative. Collective."""
-        for p in self.passes:
-            p.add_tangent(A)
+@runtime_checkable
+class Interface(Protocol):
+    """A term that joins the two faces of a crack or of a pair of surfaces.
 
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros wherever the derivative may be. Collective."""
-        for p in self.passes:
-            p.add_pattern(A)
+    Attributes:
+        entities: Rows of (cell, local facet), flattened, of both faces on this rank.
+    """
+
+    entities: NDArray[np.int32]
+
+    @property
+    def facet_energy(self) -> float:
+        """Energy that breaks a facet of mean size in opening; 0 without a law."""
+
+
+@runtime_checkable
+class Bonded(Protocol):
+    """A term whose law acts on interior facets.
+
+    Attributes:
+        name: Its name.
+    """
+
+    name: str
+
+    @property
+    def interior(self) -> NDArray[np.int32]:
+        """Local interior facets, ghosts included."""
+
+
+@runtime_checkable
+class Joining(Protocol):
+    """A term that joins surfaces whose nodes may lie in the same places.
+
+    Attributes:
+        facets: Local exterior facets of each surface.
+    """
+
+    facets: Sequence[NDArray[np.int32]]
+
+
+class Observer(Protocol):
+    """What watches terms without adding to a balance.
+
+    Attributes:
+        name: Its name.
+    """
+
+    name: str
+
+    def evaluate(self) -> None:
+        """Take note of the solved trial state, after all terms. Collective."""
+
+    def record(self) -> Columns:
+        """Columns of the history row. Collective."""
+
+
+P = TypeVar("P")
+
+
+def offering(parts: Iterable[Any], what: type[P]) -> list[P]:
+    """Those of some parts that take part in a protocol."""
+    return [part for part in parts if isinstance(part, what)]

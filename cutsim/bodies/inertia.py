@@ -22,9 +22,8 @@ from cutsim.base.assembly import Array, global_dot, nodal_forces, resultant
 from cutsim.base.checks import require
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
-from cutsim.base.terms import Term
+from cutsim.base.terms import Body, Term
 from cutsim.bodies.schemes import Scheme
-from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
 from cutsim.solvers.tangent import Tangent
 
@@ -53,7 +52,6 @@ class Inertia(Term):
     Attributes:
         velocity: Trial velocity [length/time].
         acceleration: Trial acceleration [length/time²].
-        started: Whether the first step has begun; the initial velocity is then history.
 
     Raises:
         ValueError: There is no solid, one has no density, or the mass cannot be lumped.
@@ -64,7 +62,7 @@ class Inertia(Term):
     def __init__(
         self,
         state: State,
-        solids: Sequence[Solid],
+        solids: Sequence[Body],
         scheme: Scheme,
         mass: Literal["consistent", "lumped"] = "consistent",
     ) -> None:
@@ -75,7 +73,7 @@ class Inertia(Term):
         # a node on the axis would have no mass
         whole = mass == "consistent" or not state.axisymmetric
         require("mass", mass, whole, "'consistent' in an axisymmetric problem")
-        self.state, self.scheme, self.started = state, scheme, False
+        self.state, self.scheme = state, scheme
         rule = _quadrature(state.V.ufl_element(), mass)
         self._bodies = [
             (fem.Constant(state.mesh, default_scalar_type(s.density)), state.measures.cells(s.cells)(metadata=rule))
@@ -83,13 +81,15 @@ class Inertia(Term):
         ]
         self.velocity = fem.Function(state.V, name="velocity")
         self.acceleration = fem.Function(state.V, name="acceleration")
-        self._velocity_old, self._acceleration_old = np.zeros((2, len(self.velocity.x.array)))
+        self._velocity = state.memory.array("velocity", self.velocity)
+        self._acceleration = state.memory.array("acceleration", self.acceleration)
+        self._started = state.memory.value("dynamic", False)
         self._predicted = fem.Function(state.V)
         # c/(β Δt²); zero until the first step begins
         self._weight = fem.Constant(state.mesh, default_scalar_type(0.0))
         self._field = fem.Function(state.V)
         self._momentum_form = form(self._mass(self._field, ufl.TestFunction(state.V)))
-        self._books = self._books_old = _Books(np.zeros(len(state.increment)))
+        self._books = state.memory.value("inertia", _Books(np.zeros(len(state.increment))))
 
     # -- start ----------------------------------------------------------------------------------------------------
 
@@ -114,7 +114,12 @@ class Inertia(Term):
         else:
             self.velocity.interpolate(value, cells)
         self.velocity.x.scatter_forward()
-        self._velocity_old[:] = self.velocity.x.array
+        self._velocity.commit()
+
+    @property
+    def started(self) -> bool:
+        """Whether the first step has begun; the initial velocity is then history."""
+        return self._started.committed
 
     def prescribe(self, dofs: NDArray[np.int32], velocity: float, acceleration: float) -> None:
         """Initial motion of owned dofs that a support moves."""
@@ -135,12 +140,12 @@ class Inertia(Term):
         a.scatter_forward()
         known = self._inertia_forces(a.array)
         a.array[: len(static)] = self._divide_by_mass(np.where(fixed, a.array[: len(static)], -static - known), bcs)
-        for field, old in ((self.velocity, self._velocity_old), (self.acceleration, self._acceleration_old)):
+        for field, remembered in ((self.velocity, self._velocity), (self.acceleration, self._acceleration)):
             field.x.scatter_forward()
-            old[:] = field.x.array
-        self._books = self._books_old = _Books(self._inertia_forces(a.array), self._kinetic())
-        self.started = True
-        return static + self._books.forces
+            remembered.commit()
+        self._books.set(_Books(self._inertia_forces(a.array), self._kinetic()))
+        self._started.set(True)
+        return static + self._books.committed.forces
 
     def _divide_by_mass(self, forces: Array, bcs: Sequence[fem.DirichletBC]) -> Array:
         V = self.state.V
@@ -171,11 +176,11 @@ class Inertia(Term):
         """Virtual work ∫ c ρ a(u)·v of the inertia forces."""
         return self._mass(self._weight * (self.state.u - self._predicted), v)
 
-    def begin(self, time: float) -> None:
+    def begin(self) -> None:
         """Known part of the motion; the displacement starts from that at constant velocity."""
         s, dt = self.scheme, self._dt
-        start = self.state.u_old.x.array + dt * self._velocity_old
-        self._predicted.x.array[:] = start + (0.5 - s.beta) * dt**2 * self._acceleration_old
+        start = self.state.u_old.x.array + dt * self._velocity.committed
+        self._predicted.x.array[:] = start + (0.5 - s.beta) * dt**2 * self._acceleration.committed
         self._weight.value = (1 - s.alpha_m) / (1 - s.alpha_f) / (s.beta * dt**2)
         self.state.u.x.array[:] = start
 
@@ -188,17 +193,17 @@ class Inertia(Term):
         s = self.scheme
         # R₀ is old − M a₀
         weights = s.alpha_f / (1 - s.alpha_f), (s.alpha_m - s.alpha_f) / (1 - s.alpha_f)
-        return weights[0] * old + weights[1] * self._books_old.forces
+        return weights[0] * old + weights[1] * self._books.committed.forces
 
     def evaluate(self) -> None:
         """Velocity, acceleration and their energies. Collective."""
-        s, dt, old = self.scheme, self._dt, self._books_old
+        s, dt, old = self.scheme, self._dt, self._books.committed
         a, v = self.acceleration.x.array, self.velocity.x.array
         a[:] = (self.state.u.x.array - self._predicted.x.array) / (s.beta * dt**2)
-        v[:] = self._velocity_old + dt * ((1 - s.gamma) * self._acceleration_old + s.gamma * a)
+        v[:] = self._velocity.committed + dt * ((1 - s.gamma) * self._acceleration.committed + s.gamma * a)
         forces, kinetic = self._inertia_forces(a), self._kinetic()
         work = self._dot(0.5 * (forces + old.forces), self.state.increment)
-        self._books = _Books(forces, kinetic, old.numerical + work - (kinetic - old.kinetic))
+        self._books.trial = _Books(forces, kinetic, old.numerical + work - (kinetic - old.kinetic))
 
     def balance(self, solved: Array, old: Array, free: NDArray[np.bool_]) -> Array:
         """Forces R + M a at the end of the step; call after `evaluate`. Collective.
@@ -211,15 +216,15 @@ class Inertia(Term):
             old: Forces R + M a at the start of the step.
             free: Owned dofs without a support.
         """
-        s, books = self.scheme, self._books
+        s, books = self.scheme, self._books.trial
         forces = solved - self.history(old) + (s.alpha_m - s.alpha_f) / (1 - s.alpha_f) * books.forces
         work = self._dot(np.where(free, 0.5 * (forces + old), 0.0), self.state.increment)
-        self._books = _Books(books.forces, books.kinetic, books.numerical - work)
+        self._books.trial = _Books(books.forces, books.kinetic, books.numerical - work)
         return forces
 
     def energies(self) -> dict[str, float]:
         """Kinetic energy ½ v·M v, and what the scheme has dissipated so far."""
-        return {"kinetic": self._books.kinetic, "numerical": self._books.numerical}
+        return {"kinetic": self._books.trial.kinetic, "numerical": self._books.trial.numerical}
 
     def momentum(self) -> Array:
         """Linear momentum, one number a component [force·time]. Collective."""
@@ -232,18 +237,6 @@ class Inertia(Term):
         nodal = self.velocity.x.array[: len(self.state.increment)].reshape(-1, self.state.mesh.geometry.dim)
         local = np.linalg.norm(nodal, axis=1).max(initial=0.0)
         return {"velocity_max": (float(self.state.mesh.comm.allreduce(local, op=MPI.MAX)), "velocity")}
-
-    def rollback(self) -> None:
-        """Forget the motion of the step."""
-        self.velocity.x.array[:] = self._velocity_old
-        self.acceleration.x.array[:] = self._acceleration_old
-        self._books = self._books_old
-
-    def commit(self) -> None:
-        """Adopt the motion of the step."""
-        self._velocity_old[:] = self.velocity.x.array
-        self._acceleration_old[:] = self.acceleration.x.array
-        self._books_old = self._books
 
     @property
     def _dt(self) -> float:

@@ -14,7 +14,7 @@ from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr, cofactor
 from cutsim.base.parameters import History, Schedule
 from cutsim.base.signatures import checked
-from cutsim.base.terms import Term
+from cutsim.base.terms import Columns, Term
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.state import State
 
@@ -67,7 +67,8 @@ class Support:
         dim = tdim - 1 if dim is None else dim
         self.name, self.state, self.component, self.corners = name, state, component, corners
         self.symbol = f"u_{'xyz'[component]}"
-        self._value = Schedule(state.mesh, value if self.sign > 0 else _opposite(value), "value")
+        prescribed = value if self.sign > 0 else _opposite(value)
+        self._value = Schedule(state.mesh, state.memory, prescribed, "value", name or "support")
         dofs = gdim * locate_dofs(state.V, dim, entities) + component
         owned = len(state.increment)
         self.dofs = dofs[dofs < owned]
@@ -85,9 +86,17 @@ class Support:
         """Prescribed displacement along the direction at the end of the step [length]."""
         return self.sign * self.prescribed
 
-    def begin(self, time: float) -> None:
-        """Set the displacement to its value at a time."""
-        self._value.begin(time)
+    def begin(self) -> None:
+        """Set the displacement to its value at the end of the step."""
+        self._value.begin(self.state.time)
+
+    def record(self, reaction: float) -> Columns:
+        """Displacement and force along the direction.
+
+        Args:
+            reaction: Reaction along the direction [force].
+        """
+        return {f"{self.name}_displacement": (self.displacement, "length"), f"{self.name}_force": (reaction, "force")}
 
     def rates(self, start: float, end: float) -> tuple[float, float]:
         """Prescribed velocity and acceleration of the component at the start of a span of time without a corner."""
@@ -127,12 +136,11 @@ class Load(Term, ABC):
     ) -> None:
         require_numbers("corners", corners, least=0)
         self.name, self.state, self._corners = name, state, corners
-        self._factor = Schedule(state.mesh, factor, parameter)
+        self._factor = Schedule(state.mesh, state.memory, factor, parameter, name)
         self._ds = state.measures.exterior(facets)
         self._scale = self._factor.constant
         self._form = form(self.residual(ufl.TestFunction(state.V)))
-        self._forces: NDArray[np.float64] = np.zeros(len(state.increment))
-        self._forces_old: NDArray[np.float64] = self._forces
+        self._forces = state.memory.value(f"{name}: forces", np.zeros(len(state.increment)))
 
     @abstractmethod
     def _density(self) -> Expr:
@@ -147,32 +155,30 @@ class Load(Term, ABC):
         """Minus the virtual work of the load."""
         return -self._scale * ufl.dot(self._density(), v) * self._ds
 
-    def begin(self, time: float) -> None:
-        """Set the load to its value at a time."""
-        self._factor.begin(time)
-
-    def rollback(self) -> None:
-        """Set the load back to the start of the step."""
-        self._factor.begin(self.state.time_old)
-        self._forces = self._forces_old
+    def begin(self) -> None:
+        """Set the load to its value at the end of the step."""
+        self._factor.begin(self.state.time)
 
     def evaluate(self) -> None:
         """Nodal forces of the load. Collective."""
-        self._forces = -nodal_forces(self._form)
+        self._forces.trial = -nodal_forces(self._form)
 
     def external_work(self) -> float:
         """Work of the load in the step: mean force times displacement increment. Collective."""
-        mean = 0.5 * (self._forces + self._forces_old)
+        mean = 0.5 * (self._forces.trial + self._forces.committed)
         return global_dot(self.state.mesh.comm, mean, self.state.increment)
+
+    def advise(self) -> str:
+        """Not to prescribe the load."""
+        return (
+            f"there may be no equilibrium under more of {self.name} (a limit point): prescribe a displacement instead "
+            "of the load, or use analysis='dynamic'"
+        )
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Resultant of the load. Collective."""
-        total = resultant(self.state.mesh.comm, self._forces, self.state.mesh.geometry.dim)
+        total = resultant(self.state.mesh.comm, self._forces.trial, self.state.mesh.geometry.dim)
         return {f"{self.name}_force_{'xyz'[i]}": (float(f), "force") for i, f in enumerate(total)}
-
-    def commit(self) -> None:
-        """Adopt the forces."""
-        self._forces_old = self._forces
 
 
 class Traction(Load):

@@ -42,7 +42,6 @@ class PressureField:
     Attributes:
         value: p, derivative of the volumetric energy by the measure of volume, > 0 in tension [stress].
         unknown: p as the solver sees it, times the mesh size and over Young's modulus [length].
-        committed: The same at the start of the step.
         shown: p, and zero outside the body [stress].
 
     Raises:
@@ -53,7 +52,8 @@ class PressureField:
         self._measure = _measure(material)
         self._law = law
         space = vertex_space(state.V, cells)
-        self.unknown, self.committed = fem.Function(space, name="pressure"), fem.Function(space)
+        self.unknown = fem.Function(space, name="pressure")
+        state.memory.array("pressure", self.unknown)
         unit = fem.Constant(state.mesh, default_scalar_type(material.young / _mesh_size(state)))
         self.value = unit * self.unknown
         inside = fem.Function(fem.functionspace(state.mesh, ("DG", 0)))
@@ -65,14 +65,6 @@ class PressureField:
         sample = 2 * ufl.Identity(3)
         compliance = self._measure(sample) ** 2 / (2 * self._law.energy(sample)[1])
         return self.value * self._measure(F) - 0.5 * compliance * self.value**2
-
-    def rollback(self) -> None:
-        """Restore the committed pressure bit for bit."""
-        self.unknown.x.array[:] = self.committed.x.array
-
-    def commit(self) -> None:
-        """Adopt the pressure of the step."""
-        self.committed.x.array[:] = self.unknown.x.array
 
 
 def _measure(material: Material) -> Callable[[Expr], Expr]:

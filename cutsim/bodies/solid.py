@@ -10,7 +10,6 @@ import ufl
 from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from cutsim.base.assembly import integrate, nodal_forces
 from cutsim.base.checks import nonnegative, positive, require, require_number
@@ -94,16 +93,14 @@ class Solid(Term):
         self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
         self.cells = cells
         self.measures = strain_energy_measures(state, material, volumetric, cells, name)
-        self.assembles = volumetric == "mixed"
-        self._mixed = self._projected() if self.assembles else None
+        self._mixed = self._projected() if volumetric == "mixed" else None
         self._pressure = self._continuous() if volumetric == "taylor-hood" else None
         self._overstress = None if relaxation is None else self._relaxing(relaxation)
-        self._histories = [part for part in (self._pressure, self._overstress) if part is not None]
         self._energy_form = form(self._stored(state.u))
         self._viscous_form = form(self._viscous_work()) if viscosity else None
         self._rate_form = form(self._viscous_forces(ufl.TestFunction(state.V))) if viscosity else None
-        self._viscous = self._viscous_old = 0.0
-        self._thermal = self._thermal_old = 0.0
+        self._viscous = state.memory.value(f"{name}: viscous work", 0.0)
+        self._thermal = state.memory.value(f"{name}: thermal work", 0.0)
         if thermoelastic is not None and temperature is not None:
             self._start_heating(thermoelastic.reference, temperature)
 
@@ -123,9 +120,12 @@ class Solid(Term):
         self._temperature_seen = fem.Function(temperature.space)
         self._temperature_seen.x.array[:] = reference
         self._heating_form = form(self._heating(temperature.value))
-        self._thermal = self._thermal_old = -integrate(self._heating_form)
-        self._temperature_trial = temperature.value.x.array.copy()
-        self._temperature_seen.x.array[:] = self._temperature_trial
+        self._thermal.set(-integrate(self._heating_form))
+        self._seen = self.state.memory.value(f"{self.name}: temperature", temperature.value.x.array.copy(), self._show)
+        self._show(self._seen.committed)
+
+    def _show(self, seen: NDArray[np.float64]) -> None:
+        self._temperature_seen.x.array[:] = seen
 
     def deformation_gradient(self, u: Expr) -> Expr:
         """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""
@@ -183,27 +183,12 @@ class Solid(Term):
         q = ufl.TestFunction(unknown.function_space)
         return (Multiplier(unknown, ufl.derivative(self._stored(self.state.u), unknown, q)),)
 
-    def prepare(self) -> None:
-        """Project the volume change of mixed elements. Collective."""
-        if self._mixed is not None:
-            self._mixed.prepare()
+    @property
+    def assemblers(self) -> Sequence[VolumeChange]:
+        """The tangent that goes through the projected volume change of mixed elements."""
+        return () if self._mixed is None else (self._mixed,)
 
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None = None) -> None:
-        """Add, times a displacement, the tangent that goes through the projected volume change. Collective."""
-        if self._mixed is not None and along is not None:
-            self._mixed.add_forces(b, along)
-
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add the tangent that goes through the projected volume change. Collective."""
-        if self._mixed is not None:
-            self._mixed.add_tangent(A)
-
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros for it. Collective."""
-        if self._mixed is not None:
-            self._mixed.add_pattern(A)
-
-    def begin(self, time: float) -> None:
+    def begin(self) -> None:
         """Relax the overstress over the step."""
         if self._overstress is not None:
             self._overstress.begin()
@@ -211,12 +196,12 @@ class Solid(Term):
     def evaluate(self) -> None:
         """Add the viscous dissipation of the step, and what the change of temperature adds. Collective."""
         if self._viscous_form is not None:
-            self._viscous = self._viscous_old + integrate(self._viscous_form)
+            self._viscous.trial = self._viscous.committed + integrate(self._viscous_form)
         if self._overstress is not None:
             self._overstress.evaluate()
         if self.temperature is not None:
-            self._thermal = self._thermal_old - integrate(self._heating_form)
-            self._temperature_trial = self.temperature.value.x.array.copy()
+            self._thermal.trial = self._thermal.committed - integrate(self._heating_form)
+            self._seen.trial = self.temperature.value.x.array.copy()
 
     def rate_forces(self) -> NDArray[np.float64] | None:
         """Viscous forces. Collective."""
@@ -224,17 +209,18 @@ class Solid(Term):
 
     def energies(self) -> dict[str, float]:
         """Strain energy, work of viscous stresses and minus the strain energy brought by heat so far. Collective."""
-        self.prepare()
-        strain, viscous = integrate(self._energy_form), self._viscous
+        if self._mixed is not None:
+            self._mixed.prepare()
+        strain, viscous = integrate(self._energy_form), self._viscous.trial
         if self._overstress is not None:
             strain += self._overstress.energies.stored
             viscous += self._overstress.energies.lost
-        return {"strain": strain, "viscous": viscous, "thermoelastic": self._thermal}
+        return {"strain": strain, "viscous": viscous, "thermoelastic": self._thermal.trial}
 
     @property
     def viscous_work(self) -> float:
         """Work of the Kelvin–Voigt viscosity so far, in the trial state [energy]."""
-        return self._viscous
+        return self._viscous.trial
 
     def watch(self) -> None:
         """Doubt elements that are almost flat. Collective."""
@@ -264,20 +250,6 @@ class Solid(Term):
         cell = basix.CellType[self.state.mesh.topology.cell_name()]
         points = basix.make_quadrature(cell, self.measures[0].metadata()["quadrature_degree"])[0]
         return expression(ufl.det(self.deformation_gradient(self.state.u)), points, self.state.mesh)
-
-    def rollback(self) -> None:
-        """Forget the energies of the step."""
-        self._viscous, self._thermal = self._viscous_old, self._thermal_old
-        for part in self._histories:
-            part.rollback()
-
-    def commit(self) -> None:
-        """Adopt the energies, and the temperature at which the step was in equilibrium."""
-        self._viscous_old, self._thermal_old = self._viscous, self._thermal
-        for part in self._histories:
-            part.commit()
-        if self.temperature is not None:
-            self._temperature_seen.x.array[:] = self._temperature_trial
 
     def _relaxing(self, relaxation: Prony) -> Overstress:
         def energy(F: Expr) -> Expr:

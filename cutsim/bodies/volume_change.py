@@ -79,21 +79,28 @@ class VolumeChange:
             f.x.array.reshape(-1, self._m)[self._cells] = np.einsum("cmn,cn->cm", self._inverse, moments)
             f.x.scatter_forward()
 
-    def add_forces(self, b: PETSc.Vec, along: Array) -> None:
-        """Add the tangent part that is no form, times a displacement, see `cutsim.base.terms.Term.add_forces`."""
+    @property
+    def pattern(self) -> int:
+        """Always the same."""
+        return 0
+
+    def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
+        """Add the tangent part that is no form, times a displacement, see `cutsim.base.terms.Assembler.add_forces`."""
+        if along is None:
+            return
         coupling, stiffness = self._linear()
         forces = np.einsum("cmi,cmn,cnj,cj->ci", coupling, stiffness, coupling, along[self._local], optimize=True)
         b.setValues(self._dofs.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
 
     def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add this part of the tangent, see `cutsim.base.terms.Term.add_tangent`."""
+        """Add this part of the tangent, see `cutsim.base.terms.Assembler.add_tangent`."""
         coupling, stiffness = self._linear()
         for some in self._chunks():
             B = coupling[some]
             add_blocks(A, self._dofs[some], np.swapaxes(B, 1, 2) @ stiffness[some] @ B)
 
     def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros for it, see `cutsim.base.terms.Term.add_pattern`."""
+        """Add zeros for it, see `cutsim.base.terms.Assembler.add_pattern`."""
         for some in self._chunks():
             n, size = self._dofs[some].shape
             add_blocks(A, self._dofs[some], np.zeros((n, size, size)))

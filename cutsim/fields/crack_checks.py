@@ -1,14 +1,19 @@
 """Checks of the facets of a crack: the space is cracked along them, and none is missing."""
 
+from collections.abc import Sequence
+from itertools import combinations
+
 import numpy as np
 from dolfinx import fem
 from dolfinx.mesh import Mesh, compute_midpoints, exterior_facet_indices
 from numpy.typing import NDArray
 
 from cutsim.base.checks import place
+from cutsim.base.terms import Bonded
 from cutsim.base.verdict import Verdict
 from cutsim.fields.sizes import incidence
 from cutsim.fields.space import CRACKED, refuse, sum_over_ranks
+from cutsim.fields.state import State
 
 
 def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) -> None:
@@ -33,6 +38,25 @@ def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) ->
             "cracked_space"
         )
     refuse(V.mesh.comm, problem)
+
+
+def check_cracks(state: State, cracks: Sequence[Bonded]) -> None:
+    """Refuse two cracks on one facet, whose laws would add up, and doubt gaps in them. Collective.
+
+    Args:
+        state: Displacement and time.
+        cracks: What acts on interior facets.
+
+    Raises:
+        ValueError: Two cracks share a facet.
+    """
+    for one, other in combinations(cracks, 2):
+        both = state.mesh.comm.allreduce(len(np.intersect1d(one.interior, other.interior)))
+        if both:
+            raise ValueError(f"cracks {one.name!r} and {other.name!r} share {both} facets: each facet has one law")
+    if cracks:
+        facets = np.unique(np.concatenate([c.interior for c in cracks])).astype(np.int32)
+        doubt_gaps(state.mesh, facets, " and ".join(c.name for c in cracks), state.verdict)
 
 
 def doubt_gaps(mesh: Mesh, facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:

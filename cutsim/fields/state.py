@@ -1,22 +1,44 @@
-"""State of a run: displacement and time, trial and committed."""
+"""State of a run: displacement, time and all else that is remembered, trial and committed."""
+
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from cutsim.base import kinematics
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.base.memory import Memory, Remembered
 from cutsim.base.signatures import checked
 from cutsim.base.verdict import Verdict
 from cutsim.fields.cells import check_cells
 from cutsim.fields.measures import Measures
 
 
+@dataclass(frozen=True)
+class Clock:
+    """When a step is.
+
+    Attributes:
+        time: Its end [time].
+        dt: Its size [time].
+        rate: Velocity of the displacement in it, local entries, ghosts included [length/time].
+        number: Its number, 0 before the first.
+    """
+
+    time: float
+    dt: float
+    rate: NDArray[np.float64]
+    number: int = 0
+
+
 class State:
-    """State of a run: displacement, time and step size, trial and committed.
+    """State of a run: displacement, time and step size, and the memory of all that terms remember.
 
     Args:
         V: Vector space of the displacement, usually from `cutsim.fields.space.cracked_space`.
@@ -26,8 +48,9 @@ class State:
     Attributes:
         u: Trial displacement [length].
         u_old: Committed displacement, at the start of the step.
-        time: Time at the end of the step (trial) [time].
         dt: Step size as a form constant.
+        memory: What displacement, terms, solvers and the loop over steps remember.
+        pace: What the loop over steps knows of the next one; it is set by `cutsim.analysis.stepping.run`.
         measures: Integration measures that the terms share.
         verdict: What speaks against trusting the displacement.
 
@@ -50,33 +73,50 @@ class State:
         self.dt = fem.Constant(V.mesh, default_scalar_type(1.0))
         self.measures = Measures(V.mesh, axisymmetric=axisymmetric)
         self.verdict = Verdict()
-        self.time = 0.0
-        self.time_old = 0.0
-        self._dt_old = float(self.dt.value)
-        self._rate = np.zeros_like(self.u.x.array)
+        self.memory = Memory()
+        self.memory.array("displacement", self.u, self.u_old)
+        start = Clock(0.0, float(self.dt.value), np.zeros_like(self.u.x.array))
+        self._clock = self.memory.value("clock", start, self._show)
+        self.pace: Remembered[Any] = self.memory.value("pace", None)
+
+    def _show(self, clock: Clock) -> None:
+        self.dt.value = clock.dt
+
+    @property
+    def time(self) -> float:
+        """Time at the end of the step (trial) [time]."""
+        return self._clock.trial.time
+
+    @property
+    def time_old(self) -> float:
+        """Committed time, at the start of the step [time]."""
+        return self._clock.committed.time
+
+    @property
+    def number(self) -> int:
+        """Number of the step (trial)."""
+        return self._clock.trial.number
 
     def begin(self, time: float) -> None:
         """Start a step that ends at `time`; the trial displacement starts from the committed one."""
-        self.time = time
-        self.dt.value = time - self.time_old
+        old = self._clock.committed
+        self._clock.trial = replace(old, time=time, dt=time - old.time, number=old.number + 1)
+        self.dt.value = self._clock.trial.dt
 
     def predict(self) -> None:
         """Let the trial displacement go on at the rate of the last committed step."""
-        self.u.x.array[:] = self.u_old.x.array + float(self.dt.value) * self._rate
+        self.u.x.array[:] = self.u_old.x.array + float(self.dt.value) * self._clock.committed.rate
 
     def rollback(self) -> None:
-        """Restore the committed displacement and time bit for bit."""
-        self.u.x.array[:] = self.u_old.x.array
-        self.time = self.time_old
-        self.dt.value = self._dt_old
+        """Give the trial step up: all that is remembered is as it was at its start, bit for bit."""
+        self.memory.rollback()
 
     def commit(self) -> None:
-        """Adopt the trial displacement and time."""
+        """Adopt the trial step, with all that is remembered."""
         if self.time > self.time_old:
-            self._rate = (self.u.x.array - self.u_old.x.array) / (self.time - self.time_old)
-        self.u_old.x.array[:] = self.u.x.array
-        self.time_old = self.time
-        self._dt_old = float(self.dt.value)
+            rate = (self.u.x.array - self.u_old.x.array) / (self.time - self.time_old)
+            self._clock.trial = replace(self._clock.trial, rate=rate)
+        self.memory.commit()
 
     def deformation_gradient(self, u: Expr) -> Expr:
         """Deformation gradient of a displacement, 3 × 3, with the hoop stretch 1 + u_r/r of an axisymmetric problem."""

@@ -56,7 +56,7 @@ class Temperature:
             self.value.x.array[:] = initial
         self.value.x.scatter_forward()
         self.check("initial", self.minimum())
-        self.commit()
+        state.memory.array("temperature", self.value, self.old)
 
     def check(self, name: str, temperature: float) -> None:
         """Refuse a temperature below absolute zero, by the name of the parameter.
@@ -73,11 +73,3 @@ class Temperature:
     def maximum(self) -> float:
         """Highest trial temperature at a node. Collective."""
         return float(self.space.mesh.comm.allreduce(self.value.x.array.max(initial=-np.inf), op=MPI.MAX))
-
-    def rollback(self) -> None:
-        """Restore the committed temperature bit for bit."""
-        self.value.x.array[:] = self.old.x.array
-
-    def commit(self) -> None:
-        """Adopt the trial temperature."""
-        self.old.x.array[:] = self.value.x.array

@@ -1,5 +1,7 @@
 """Heat capacity and conduction of a body (docs/theory.md §3.4)."""
 
+from typing import Protocol
+
 import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
@@ -15,6 +17,13 @@ from cutsim.base.signatures import checked
 from cutsim.bodies.solid import Solid
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
+
+
+class Moved(Protocol):
+    """What has a deformation gradient."""
+
+    def deformation_gradient(self, u: Expr) -> Expr:
+        """Deformation gradient of a displacement, 3 × 3."""
 
 
 class HeatBody(HeatTerm):
@@ -54,15 +63,19 @@ class HeatBody(HeatTerm):
     ) -> None:
         super().__init__(temperature, name)
         mesh, measures = self.state.mesh, self.state.measures
-        density = body.density if density is None and isinstance(body, Solid) else density
+        self._moved: Moved = self.state
+        cells: NDArray[np.int32] | None
+        if body is None or isinstance(body, np.ndarray):
+            cells = body
+        else:
+            self._moved, cells = body, body.cells
+            density = body.density if density is None else density
         require_number("density", density, positive)
         assert density is not None
         require_number("capacity", capacity, positive)
-        self._solid = body if isinstance(body, Solid) else None
-        cells = body.cells if isinstance(body, Solid) else body
         self._conductivity = fem.Constant(mesh, _conductivity(conductivity, mesh.geometry.dim))
         self._heat_capacity = fem.Constant(mesh, default_scalar_type(density * capacity))
-        self._source = Schedule(mesh, source, "source")
+        self._source = Schedule(mesh, self.state.memory, source, "source", name)
         degree = temperature.space.ufl_element().degree
         # a marker for each rule, hence a kernel for each: FFCx 0.9 may mix two rules up within a kernel
         nodes = {"quadrature_rule": "vertex", "quadrature_degree": 1}
@@ -83,14 +96,14 @@ class HeatBody(HeatTerm):
     def residual(self, w: Expr) -> ufl.Form:
         """Heat stored minus conducted and supplied."""
         T, T_old = self.temperature.value, self.temperature.old
-        F = (self._solid or self.state).deformation_gradient(self.state.u)
+        F = self._moved.deformation_gradient(self.state.u)
         flow = ufl.det(F) * ufl.inner(self._conductivity * _gradient(T, F), _gradient(w, F))
         rate = self._heat_capacity * (T - T_old) / self.state.dt
         return (flow - self._source.constant * w) * self._dx + rate * w * self._dx_storage
 
-    def begin(self, time: float) -> None:
+    def begin(self) -> None:
         """Set the source to its value at the end of the step."""
-        self._source.begin(time)
+        self._source.begin(self.state.time)
 
     def heat(self) -> dict[str, float]:
         """Heat stored and supplied in the step. Collective."""
@@ -104,10 +117,6 @@ class HeatBody(HeatTerm):
             f"{self.name}_temperature": (integrate(self._mean_form) / self._volume, "temperature"),
             f"{self.name}_temperature_max": (self.state.mesh.comm.allreduce(highest, op=MPI.MAX), "temperature"),
         }
-
-    def rollback(self) -> None:
-        """Set the source back to the start of the step."""
-        self._source.begin(self.state.time_old)
 
 
 def _gradient(f: Expr, F: Expr) -> Expr:

@@ -1,6 +1,7 @@
 """Heat exchange between two surfaces at their integration points: fluxes, interface temperature, entropy."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +18,14 @@ logger = collective_logger(__name__)
 
 # negative contact dissipation down to this fraction of the largest one is rounding
 _ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class _Exchanged:
+    """Values at the points by name, and the entropy produced since the start [energy/temperature]."""
+
+    values: Mapping[str, Values]
+    entropy: float = 0.0
 
 
 class HeatExchange:
@@ -55,20 +64,23 @@ class HeatExchange:
         fields = {"flux_plus": q_plus, "flux_minus": q_minus, "temperature": mixed}
         self._evaluate = points.evaluator(fields | {"temperature_plus": plus, "temperature_minus": minus})
         self._friction = self._fracture = np.zeros_like(points.weights)
-        self._entropy = self._entropy_old = 0.0
-        self._start()
+        self._now = temperature.state.memory.value(f"{name}: heat", self._start(), self._show)
+        self._show(self._now.committed)
 
-    def _start(self) -> None:
+    def _start(self) -> _Exchanged:
         """The interface starts with the mean temperature of the surfaces, without flux."""
         values = self._evaluate()
         mean = np.asarray(0.5 * (values["temperature_plus"] + values["temperature_minus"]))
-        self.values: dict[str, Values] = {
-            **values,
-            **dict.fromkeys(("flux_plus", "flux_minus", "dissipation"), np.zeros_like(mean)),
-            "temperature": mean,
-        }
-        self._values_old = self.values
-        self.points.set(self._contact, mean)
+        none = dict.fromkeys(("flux_plus", "flux_minus", "dissipation"), np.zeros_like(mean))
+        return _Exchanged({**values, **none, "temperature": mean})
+
+    def _show(self, committed: _Exchanged) -> None:
+        self.points.set(self._contact, committed.values["temperature"])
+
+    @property
+    def values(self) -> Mapping[str, Values]:
+        """Trial values at the points, by name, see `point_values`."""
+        return self._now.trial.values
 
     @property
     def entity_maps(self) -> EntityMaps:
@@ -95,8 +107,8 @@ class HeatExchange:
         kept = flux_plus + flux_minus + self.points.get(self._source)
         entropy = kept / (values["temperature"] - zero)
         entropy -= flux_plus / (values["temperature_plus"] - zero) + flux_minus / (values["temperature_minus"] - zero)
-        self._entropy = self._entropy_old + float(self._dt.value) * self._integral(entropy)
-        self.values = values
+        produced = float(self._dt.value) * self._integral(entropy)
+        self._now.trial = _Exchanged(values, self._now.committed.entropy + produced)
         least, most = self.least_dissipation(), self.points.maximum(np.abs(values["dissipation"]))
         if least < -_ROUNDING * most:
             logger.warning("%s: contact dissipation %.3g < 0 at a point", self.name, least)
@@ -133,7 +145,7 @@ class HeatExchange:
     @property
     def entropy(self) -> float:
         """Entropy produced since the start, the trial step included [energy/temperature]."""
-        return self._entropy
+        return self._now.trial.entropy
 
     def point_values(self, name: str) -> Values:
         """Trial values at the integration points, shape (local facets, points).
@@ -147,15 +159,6 @@ class HeatExchange:
         """
         require("name", name, name in self.values, f"one of {', '.join(self.values)}")
         return self.values[name]
-
-    def rollback(self) -> None:
-        """Forget the trial step."""
-        self.values, self._entropy = self._values_old, self._entropy_old
-
-    def commit(self) -> None:
-        """Adopt interface temperature and entropy."""
-        self.points.set(self._contact, self.values["temperature"])
-        self._values_old, self._entropy_old = self.values, self._entropy
 
 
 def contact_columns(name: str, exchanges: Sequence[HeatExchange]) -> dict[str, tuple[float, str]]:

@@ -97,8 +97,16 @@ class HeatPass:
         self._feel()
         self.exchange.evaluate()
 
+    @property
+    def pattern(self) -> int:
+        """Number of the sparsity pattern."""
+        return self.contact.pattern
+
+    def prepare(self) -> None:
+        """Nothing: partners are found when forces are asked for."""
+
     def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
-        """Add the heat that leaves the bodies, as `cutsim.base.terms.Term.add_forces`."""
+        """Add the heat that leaves the bodies, as `cutsim.base.terms.Assembler.add_forces`."""
         self._feel()
         fluxes, rates = self._law()
         if along is not None:
@@ -107,14 +115,14 @@ class HeatPass:
         b.setValues(self._nodes.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
 
     def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add the tangent, as `cutsim.base.terms.Term.add_tangent`."""
+        """Add the tangent, as `cutsim.base.terms.Assembler.add_tangent`."""
         rates = self._law()[1]
         rows = np.flatnonzero(rates.any(axis=(1, 2)) & (self.contact.weights > 0))
         weighted, shares = self.contact.weights[rows, None, None] * rates[rows], self._shares[rows]
         add_blocks(A, self._nodes[rows], shares.transpose(0, 2, 1) @ weighted @ shares)
 
     def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros, as `cutsim.base.terms.Term.add_pattern`."""
+        """Add zeros, as `cutsim.base.terms.Assembler.add_pattern`."""
         near = [facets[self._slave.owned[self.contact.kinematics.near[0]]] for facets in self.contact.kinematics.near]
         own = self._slave.global_nodes
         facing = np.hstack([own[near[0]], self._master.global_nodes[near[1]]])

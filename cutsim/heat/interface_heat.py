@@ -72,7 +72,7 @@ class InterfaceHeat(HeatTerm):
         q_plus, q_minus = self.exchange.fluxes
         return (q_plus * w("+") + q_minus * w("-")) * self.crack.points.measure
 
-    def begin(self, time: float) -> None:
+    def begin(self) -> None:
         """Take over pressure and dissipation of the mechanical step."""
         nothing = np.zeros_like(self.crack.points.weights)
         self.exchange.begin(
@@ -96,14 +96,6 @@ class InterfaceHeat(HeatTerm):
             f"{self.name}_heat_flow_minus": (self.exchange.flow("minus"), "power"),
         }
         return flows | contact_columns(self.name, [self.exchange])
-
-    def rollback(self) -> None:
-        """Forget the trial step."""
-        self.exchange.rollback()
-
-    def commit(self) -> None:
-        """Adopt interface temperature and entropy."""
-        self.exchange.commit()
 
 
 def _is_cracked(V: fem.FunctionSpace, crack: Crack) -> bool:

@@ -13,6 +13,7 @@ from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import History, Schedule
 from cutsim.base.signatures import checked
+from cutsim.base.terms import Columns
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
@@ -33,7 +34,7 @@ class _SurfaceHeat(HeatTerm, ABC):
         super().__init__(temperature, name)
         require_numbers("corners", corners, least=0)
         self._corners = corners
-        self._value = Schedule(self.state.mesh, value, parameter)
+        self._value = Schedule(self.state.mesh, self.state.memory, value, parameter, name)
         self._ds = self.state.measures.exterior(facets)
         self._flow = form(self._influx() * self._ds)
 
@@ -50,9 +51,9 @@ class _SurfaceHeat(HeatTerm, ABC):
         """Minus the heat that flows in."""
         return -self._influx() * w * self._ds
 
-    def begin(self, time: float) -> None:
-        """Set the number to its value at a time."""
-        self._value.begin(time)
+    def begin(self) -> None:
+        """Set the number to its value at the end of the step."""
+        self._value.begin(self.state.time)
 
     def heat_flow(self) -> float:
         """Heat that flows into the body at the trial temperature [power]. Collective."""
@@ -65,10 +66,6 @@ class _SurfaceHeat(HeatTerm, ABC):
     def record(self) -> dict[str, tuple[float, str]]:
         """Heat flow into the body. Collective."""
         return {f"{self.name}_heat_flow": (self.heat_flow(), "power")}
-
-    def rollback(self) -> None:
-        """Set the number back to the start of the step."""
-        self._value.begin(self.state.time_old)
 
 
 class HeatFlux(_SurfaceHeat):
@@ -132,13 +129,13 @@ class Convection(_SurfaceHeat):
         super().__init__(temperature, facets, ambient, "ambient", name, corners)
         temperature.check("ambient", self._value.value)
 
-    def begin(self, time: float) -> None:
-        """Set the temperature of the surroundings to its value at a time.
+    def begin(self) -> None:
+        """Set the temperature of the surroundings to its value at the end of the step.
 
         Raises:
             ValueError: It is below absolute zero.
         """
-        super().begin(time)
+        super().begin()
         self.temperature.check("ambient", self._value.value)
 
     def _influx(self) -> Expr:
@@ -181,7 +178,7 @@ class PrescribedTemperature:
         require_numbers("corners", corners, least=0)
         mesh, V = temperature.space.mesh, temperature.space
         self.name, self.temperature, self.corners = name, temperature, corners
-        self._value = Schedule(mesh, value, "value")
+        self._value = Schedule(mesh, temperature.state.memory, value, "value", name or "prescribed temperature")
         temperature.check("value", self._value.value)
         tdim = mesh.topology.dim
         require("dim", dim, dim is None or dim in range(tdim + 1), f"0 … {tdim}, or None for facets")
@@ -191,20 +188,24 @@ class PrescribedTemperature:
         require("entities", found, found > 0, f"entities that carry dofs (prescribed temperature {name!r})")
         self.bc = fem.dirichletbc(self._value.constant, dofs, V)
 
-    def begin(self, time: float) -> None:
-        """Set the temperature to its value at a time.
+    def begin(self) -> None:
+        """Set the temperature to its value at the end of the step.
 
         Raises:
             ValueError: It is below absolute zero.
         """
-        self._value.begin(time)
+        self._value.begin(self.temperature.state.time)
         self.temperature.check("value", self._value.value)
+
+    def record(self, reaction: float) -> Columns:
+        """Heat flow through it.
+
+        Args:
+            reaction: Heat flow into the body [power].
+        """
+        return {f"{self.name}_heat_flow": (reaction, "power")}
 
     @property
     def prescribed(self) -> float:
         """Prescribed temperature at the end of the step [temperature]."""
         return self._value.value
-
-    def rollback(self) -> None:
-        """Set the temperature back to the start of the step."""
-        self._value.begin(self.temperature.state.time_old)

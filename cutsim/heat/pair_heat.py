@@ -1,10 +1,13 @@
 """Heat between two surfaces with large sliding (docs/theory.md §3.4, §3.5)."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+import ufl
+
 from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
-from cutsim.base.terms import AssembledTerm
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.balance import HeatTerm
 from cutsim.heat.contact_heat import ContactHeat
@@ -13,7 +16,7 @@ from cutsim.heat.heat_pass import HeatPass
 from cutsim.pairs.surface_pair import SurfacePair
 
 
-class PairHeat(AssembledTerm[HeatPass], HeatTerm):
+class PairHeat(HeatTerm):
     """Heat exchange across a pair of surfaces, heated by their friction and fracture.
 
     Pressure, partners and dissipation are those of the mechanical step, per reference area of the slave.  The interface
@@ -45,12 +48,16 @@ class PairHeat(AssembledTerm[HeatPass], HeatTerm):
             for contact, master, side in zip(pair.passes, pair.facets[::-1], (law, swapped), strict=False)
         )
 
-    @property
-    def pattern(self) -> int:
-        """Number of the sparsity pattern."""
-        return self.pair.pattern
+    def residual(self, w: Expr) -> ufl.Form:
+        """No form: all heat is exchanged by the passes."""
+        return ufl.Form([])
 
-    def begin(self, time: float) -> None:
+    @property
+    def assemblers(self) -> Sequence[HeatPass]:
+        """The passes."""
+        return self.passes
+
+    def begin(self) -> None:
         """Take over partners, pressure and dissipation of the mechanical step. Collective."""
         for p in self.passes:
             p.begin()
@@ -74,13 +81,3 @@ class PairHeat(AssembledTerm[HeatPass], HeatTerm):
         """Heat flow out of slave and master, highest temperature, contact dissipation, entropy. Collective."""
         flows = {f"{self.name}_heat_flow_{side}": (self.flow(side), "power") for side in ("plus", "minus")}
         return flows | contact_columns(self.name, [p.exchange for p in self.passes])
-
-    def rollback(self) -> None:
-        """Forget the trial step."""
-        for p in self.passes:
-            p.exchange.rollback()
-
-    def commit(self) -> None:
-        """Adopt interface temperature and entropy."""
-        for p in self.passes:
-            p.exchange.commit()

@@ -50,7 +50,9 @@ class ToolHeat(HeatTerm):
         require("law.capacity", law.capacity, law.capacity == 0, "0 for a tool")
         self.tool = tool
         self._tool_temperature = (
-            None if tool_temperature is None else Schedule(self.state.mesh, tool_temperature, "tool_temperature")
+            None
+            if tool_temperature is None
+            else Schedule(self.state.mesh, self.state.memory, tool_temperature, "tool_temperature", self.name)
         )
         self._check()
         self.exchanges = [
@@ -76,14 +78,14 @@ class ToolHeat(HeatTerm):
         parts = zip(self.exchanges, self.tool.patches, strict=True)
         return sum((e.fluxes[0] * p.surface.restrict(w) * p.surface.measure for e, p in parts), start=ufl.Form([]))
 
-    def begin(self, time: float) -> None:
+    def begin(self) -> None:
         """Take over pressure and dissipation of the mechanical step. Collective.
 
         Raises:
             ValueError: The tool's temperature is below absolute zero.
         """
         if self._tool_temperature is not None:
-            self._tool_temperature.begin(time)
+            self._tool_temperature.begin(self.state.time)
             self._check()
         for exchange, patch in zip(self.exchanges, self.tool.patches, strict=True):
             exchange.begin(patch.pressure(), patch.dissipation(), np.zeros_like(exchange.points.weights))
@@ -106,15 +108,3 @@ class ToolHeat(HeatTerm):
         """Heat flow into the tool, highest temperature, contact dissipation and entropy at the contact. Collective."""
         flow = {f"{self.name}_heat_flow": (self.heat_flow(), "power")}
         return flow | contact_columns(self.name, self.exchanges)
-
-    def rollback(self) -> None:
-        """Forget the trial step."""
-        if self._tool_temperature is not None:
-            self._tool_temperature.begin(self.state.time_old)
-        for exchange in self.exchanges:
-            exchange.rollback()
-
-    def commit(self) -> None:
-        """Adopt the entropy."""
-        for exchange in self.exchanges:
-            exchange.commit()

@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
+from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
@@ -32,6 +33,8 @@ from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.law import Response, respond
 
+#: Fields of a crack for output.
+FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
 # pressure over that of faces which look at each other that counts as none
 _ROUNDING = 1e-9
 
@@ -115,7 +118,7 @@ class Crack(Term):
         if law is not None:
             doubt_law(state.verdict, name, law, young, self.size)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
-        self.history = InterfaceHistory(self.points, law)
+        self.history = InterfaceHistory(state.memory, name, self.points, law)
         self._point_values = self.points.evaluator(self._columns())
 
     # -- virtual work ---------------------------------------------------------------------------------------------
@@ -124,6 +127,21 @@ class Crack(Term):
     def entity_maps(self) -> EntityMaps:
         """Map from facets of the mesh to cells of the crack's submesh."""
         return self.points.entity_maps
+
+    @property
+    def submesh(self) -> Mesh:
+        """Mesh of the facets."""
+        return self.points.submesh
+
+    @property
+    def facet_fields(self) -> tuple[str, ...]:
+        """Fields for output, averaged over each facet; none without a law."""
+        return () if self.law is None else FIELDS
+
+    @property
+    def interior(self) -> NDArray[np.int32]:
+        """Local interior facets of the crack, ghosts included."""
+        return self.points.facets
 
     @property
     def facet_energy(self) -> float:
@@ -187,14 +205,6 @@ class Crack(Term):
             return False
         pressure = self._evaluate_at(1.0)["pressure"]
         return self.history.augment(pressure, self.contact.stiffness * self._allowed_penetration)
-
-    def rollback(self) -> None:
-        """Restore the contact multiplier, and what is known at the points, of the committed state."""
-        self.history.rollback()
-
-    def commit(self) -> None:
-        """Adopt history, work and multiplier of the step."""
-        self.history.commit()
 
     def energies(self) -> dict[str, float]:
         """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""

@@ -61,6 +61,7 @@ class CrackFriction(Term):
         self._share = response.damage[1] if acts_on == "broken" else ufl.as_ufl(1.0)
         self.slip = SlipHistory(
             crack.state,
+            self.name,
             crack.points,
             completed(law, crack.contact.stiffness),
             ufl.as_vector([ufl.dot(response.jump, a) for a in self._frame]),
@@ -102,11 +103,3 @@ class CrackFriction(Term):
         sticks, slips = self.slip.areas()
         kind = self.crack.state.facet_measure
         return {f"{self.crack.name}_sticking": (sticks, kind), f"{self.crack.name}_slipping": (slips, kind)}
-
-    def rollback(self) -> None:
-        """Forget the slip of the trial step."""
-        self.slip.rollback()
-
-    def commit(self) -> None:
-        """Adopt the slip of the step."""
-        self.slip.commit()

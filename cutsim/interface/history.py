@@ -1,10 +1,11 @@
 """History variables of an interface: secants, contact multiplier, dissipation, contact work (docs/theory.md §3.2)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from cutsim.base.memory import Memory
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.dissipation import Way, losses
@@ -36,10 +37,29 @@ _COLUMNS = ("contact_power", "stored", "damage", "opening", "sliding", "pressure
 Along = Callable[[float], dict[str, Values]]
 
 
+@dataclass(frozen=True)
+class _Known:
+    """What is known at the points at the end of a step.
+
+    Attributes:
+        values: Values by name, see `Along`.
+        secants: Smallest secant stiffnesses so far, a vector [stress/length].
+        lost: Fracture dissipation so far [energy per reference area].
+        contact: Work of the contact traction so far [energy per reference area].
+    """
+
+    values: Mapping[str, Values]
+    secants: Values
+    lost: Values
+    contact: Values
+
+
 class InterfaceHistory:
-    """Secants, dissipation and contact multiplier at the points of an interface, trial and committed.
+    """Secants, dissipation and contact multiplier at the points of an interface.
 
     Args:
+        memory: Memory of the run.
+        name: Name of the interface.
         points: Integration points.
         law: Cohesive law, None for a broken interface.
         rule: Where work of contact is evaluated.
@@ -48,32 +68,44 @@ class InterfaceHistory:
     Attributes:
         secants: Smallest secant stiffnesses before this step, a vector at the points [stress/length].
         multiplier: Contact multiplier λ_N, a function of the points [stress].
-        trial: Values at the end of the trial step, by name.
     """
 
     def __init__(
-        self, points: FacetPoints, law: CohesiveLaw | None, rule: PathRule = GAUSS, also: tuple[str, ...] = ()
+        self,
+        memory: Memory,
+        name: str,
+        points: FacetPoints,
+        law: CohesiveLaw | None,
+        rule: PathRule = GAUSS,
+        also: tuple[str, ...] = (),
     ) -> None:
         self._points, self._law, self._rule = points, law, rule
         self.secants, self.multiplier = points.function(2), points.function()
-        if law is not None:
-            zero = np.zeros_like(points.weights)
-            points.set(self.secants, np.stack(law.secants(zero, zero), axis=-1))
-        self._multiplier_old = self.multiplier.x.array.copy()
         zero = np.zeros_like(points.weights)
-        self.trial = self._trial_old = dict.fromkeys((*_COLUMNS, *also), zero)
-        self._contact = self._contact_old = self._lost = self._lost_old = zero
+        secants = np.zeros((*zero.shape, 2)) if law is None else np.stack(law.secants(zero, zero), axis=-1)
+        start = _Known(dict.fromkeys((*_COLUMNS, *also), zero), secants, lost=zero, contact=zero)
+        self._known = memory.value(f"{name}: points", start, self._show)
+        memory.array(f"{name}: multiplier", self.multiplier)
+        self._show(start)
+
+    def _show(self, committed: _Known) -> None:
+        self._points.set(self.secants, committed.secants)
+
+    @property
+    def trial(self) -> Mapping[str, Values]:
+        """Values at the end of the trial step, by name."""
+        return self._known.trial.values
 
     def evaluate(self, along: Along) -> None:
         """Trial values, losses and the work of contact over the step. Collective."""
         at = {s: along(s) for s in sorted({0.0, 1.0, *self._rule.places})}
         powers = (w * at[s]["contact_power"] for s, w in zip(self._rule.places, self._rule.weights, strict=True))
-        self._contact = sum(powers, start=self._contact_old)
-        self.trial = at[1.0]
+        old, secants, lost = self._known.committed, self._known.committed.secants, self._known.committed.lost
         if self._law is not None:
             way = Way(*(at[s]["jump"].reshape(-1, at[s]["jump"].shape[-1]) for s in (0.0, 1.0)))
-            lost = losses(self._law, way, self._points.get(self.secants).reshape(-1, 2))
-            self._lost = self._lost_old + lost.reshape(self._points.weights.shape)
+            lost = lost + losses(self._law, way, secants.reshape(-1, 2)).reshape(lost.shape)
+            secants = np.minimum(secants, at[1.0]["secants"])
+        self._known.trial = _Known(at[1.0], secants, lost, sum(powers, start=old.contact))
 
     def augment(self, pressure: Values, tolerance: float) -> bool:
         """Uzawa step λ ← p (thesis 4.33) if a closed point is off by more than is allowed. Collective.
@@ -93,34 +125,22 @@ class InterfaceHistory:
         self._points.set(self.multiplier, pressure)
         return True
 
-    def rollback(self) -> None:
-        """Restore the contact multiplier, and what is known at the points, of the committed state."""
-        self.multiplier.x.array[:] = self._multiplier_old
-        self.trial, self._lost, self._contact = self._trial_old, self._lost_old, self._contact_old
-
-    def commit(self) -> None:
-        """Adopt memory, losses, work and multiplier of the step."""
-        if self._law is not None:
-            self._points.set(self.secants, np.minimum(self._points.get(self.secants), self.trial["secants"]))
-        self._multiplier_old[:] = self.multiplier.x.array
-        self._trial_old, self._lost_old, self._contact_old = self.trial, self._lost, self._contact
-
     def energies(self) -> dict[str, float]:
         """Recoverable and lost part of the cohesive work, and the energy of the contact penalty. Collective."""
         return {
             "cohesive_stored": self._points.integral(self.trial["stored"]),
-            "fracture": self._points.integral(self._lost),
-            "contact": self._points.integral(self._contact),
+            "fracture": self._points.integral(self._known.trial.lost),
+            "contact": self._points.integral(self._known.trial.contact),
         }
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
-        return self._points.maximum(self.trial["damage"] - self._trial_old["damage"])
+        return self._points.maximum(self.trial["damage"] - self._known.committed.values["damage"])
 
     def dissipated(self) -> Values:
         """Fracture dissipation so far at the points [energy per reference area]."""
-        return self._lost
+        return self._known.trial.lost
 
     def dissipation(self) -> Values:
         """Fracture dissipation of the trial step at the points [energy per reference area]."""
-        return self._lost - self._lost_old
+        return self._known.trial.lost - self._known.committed.lost

@@ -42,6 +42,7 @@ class SlipHistory:
 
     Args:
         state: Displacement and time.
+        name: Name of the surface.
         points: Integration points.
         law: Friction law with a tangential penalty.
         slip: Slip s, a vector [length].
@@ -59,6 +60,7 @@ class SlipHistory:
     def __init__(
         self,
         state: State,
+        name: str,
         points: FacetPoints,
         law: FrictionLaw,
         slip: Expr,
@@ -94,8 +96,9 @@ class SlipHistory:
         start = self._evaluate()
         none = np.zeros_like(points.weights)
         flat = dict.fromkeys(("advance", "limit", "pressure", "level", "dissipated", "held"), none)
-        self._trial = self._old = {**start, **flat, "traction": np.zeros_like(start["traction"])}
-        self._remember(self._old["traction"])
+        values = {**start, **flat, "traction": np.zeros_like(start["traction"])}
+        self._known = state.memory.value(f"{name}: slip", values, lambda known: self._start_from(known["traction"]))
+        self._start_from(values["traction"])
 
     def _slide(self, slip: Expr, penetration: Expr, project: Callable[[Expr], Expr]) -> tuple[Expr, Expr, Expr]:
         """Slide of the step, its fraction after closure, and the slip that the law resists."""
@@ -111,7 +114,7 @@ class SlipHistory:
         A step that begins to slip on its way dissipates from there on: the limit at that place is interpolated.  Where
         a point closes, half of the limit dissipates over the whole way, as the mean force of the step does work.
         """
-        new, old = self._evaluate(), self._old
+        new, old = self._evaluate(), self._known.committed
         size = np.linalg.norm(new["traction"], axis=-1)
         way = np.linalg.norm(new["slid"], axis=-1)
         advance = new["advance"]
@@ -129,7 +132,7 @@ class SlipHistory:
         new["dissipated"] = old["dissipated"] + mean * (new["level"] - 0.5 * late * growth) * rubbed
         before, now = (0.5 * self._elastic * np.sum(w["traction"] ** 2, axis=-1) for w in (old, new))
         new["held"] = old["held"] + mean * (now - before)
-        self._trial = new
+        self._known.trial = new
 
     def augment(self) -> bool:
         """Raise what is carried so that points that stick do so better; True if one was off by too much. Collective."""
@@ -143,41 +146,31 @@ class SlipHistory:
         mean = np.linalg.norm([self.points.facet_mean(component) for component in moved], axis=0)
         if self.points.maximum(np.where(sticks, mean, 0.0)) <= self._tolerance:
             return False
-        self._remember(new["traction"])
+        self._start_from(new["traction"])
         return True
 
-    def rollback(self) -> None:
-        """Restore the committed memory and point values."""
-        self._trial = self._old
-        self._remember(self._old["traction"])
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-        self._old = self._trial
-        self._remember(self._old["traction"])
-
-    def _remember(self, traction: Values) -> None:
+    def _start_from(self, traction: Values) -> None:
         """Start from the slip and the penetration of the last step, and carry a traction."""
-        start, carried = self._old["slip"], self._compliance * traction
-        self.points.set(self._memory, np.concatenate([start, carried, self._old["penetration"][..., None]], axis=-1))
+        old, carried = self._known.committed, self._compliance * traction
+        self.points.set(self._memory, np.concatenate([old["slip"], carried, old["penetration"][..., None]], axis=-1))
 
     def values(self, name: str) -> Values:
         """Trial point values: "traction", "slip" (vectors), "pressure", "advance" (slip of the step, not elastic)."""
-        return self._trial[name]
+        return self._known.trial[name]
 
     def dissipation(self) -> Values:
         """Friction dissipation of the trial step [energy per reference area]."""
-        return self._trial["dissipated"] - self._old["dissipated"]
+        return self._known.trial["dissipated"] - self._known.committed["dissipated"]
 
     def energies(self) -> dict[str, float]:
         """Energy dissipated so far, and stored in the tangential penalty. Collective."""
         return {
-            "friction": self.points.integral(self._trial["dissipated"]),
-            "contact": self.points.integral(self._trial["held"]),
+            "friction": self.points.integral(self._known.trial["dissipated"]),
+            "contact": self.points.integral(self._known.trial["held"]),
         }
 
     def areas(self) -> tuple[float, float]:
         """Area that sticks and area that slips under pressure. Collective."""
-        pressed = self._trial["share"] * (self._trial["limit"] > 0)
-        slips = self._trial["advance"] > 0
+        pressed = self._known.trial["share"] * (self._known.trial["limit"] > 0)
+        slips = self._known.trial["advance"] > 0
         return self.points.integral(pressed * ~slips), self.points.integral(pressed * slips)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.assembly import integrate
 from cutsim.base.compat import form
+from cutsim.base.memory import Memory
 from cutsim.materials.spring import Spring
 
 Array = NDArray[np.float64]
@@ -43,9 +44,10 @@ class _Terms:
 
 
 class Maxwell:
-    """Stored and dissipated energy of the overstresses, trial and committed. Collective.
+    """Stored and dissipated energy of the overstresses. Collective.
 
     Args:
+        memory: Memory of the run.
         spring: The strain energy that relaxes.
         strengths: gᵢ of the series.
         density: Function of one value at each integration point, for sums over the body.
@@ -54,24 +56,30 @@ class Maxwell:
     """
 
     def __init__(
-        self, spring: Spring, strengths: Array, density: fem.Function, measure: ufl.Measure, strain: Array
+        self,
+        memory: Memory,
+        spring: Spring,
+        strengths: Array,
+        density: fem.Function,
+        measure: ufl.Measure,
+        strain: Array,
     ) -> None:
         self._spring, self._strengths, self._density = spring, strengths, density
         self._dofs = density.function_space.dofmap.list[spring.cells]
         self._integral = form(density * measure)
         rest = np.zeros((len(strengths), *strain.shape))
         relaxed = np.stack([spring.reduced(strain)] * len(strengths))
-        self._now = self._old = _Terms(rest, relaxed, rest)
+        self._terms = memory.value("maxwell", _Terms(rest, relaxed, rest))
 
     @property
     def stored(self) -> float:
         """Energy that the springs of the series would give back [energy]."""
-        return self._now.stored
+        return self._terms.trial.stored
 
     @property
     def lost(self) -> float:
         """Energy that the dashpots have turned into heat so far [energy]."""
-        return self._now.lost
+        return self._terms.trial.lost
 
     def evaluate(self, strain: Array, stress: Array, overstress: Array, steps: Array) -> None:
         """Energies at the end of a step.
@@ -82,27 +90,20 @@ class Maxwell:
             overstress: h of each term as work conjugates.
             steps: Size of the step over the relaxation time of each term.
         """
+        old = self._terms.committed
         full = self._spring.reduced(strain)
         W = self._spring.energy(full)
-        relaxed, ahead = np.empty_like(self._old.relaxed), np.empty_like(overstress)
+        relaxed, ahead = np.empty_like(old.relaxed), np.empty_like(overstress)
         stored = lost = np.zeros_like(W)
-        for i, (g, h, h_old) in enumerate(zip(self._strengths, overstress, self._old.overstress, strict=True)):
+        for i, (g, h, h_old) in enumerate(zip(self._strengths, overstress, old.overstress, strict=True)):
             z = stress - h / g
-            relaxed[i] = self._spring.invert(z, self._old.relaxed[i])
+            relaxed[i] = self._spring.invert(z, old.relaxed[i])
             ahead[i] = (full - relaxed[i])[..., :-1]
             stored = stored + g * (W - self._spring.energy(relaxed[i]) - (z * ahead[i]).sum(-1))
             start, cross, end = _weights(steps[i])
-            first, last = self._old.ahead[i], ahead[i]
+            first, last = old.ahead[i], ahead[i]
             lost = lost + (h_old * (start * first + cross * last) + h * (cross * first + end * last)).sum(-1)
-        self._now = _Terms(overstress, relaxed, ahead, self._sum(stored), self._old.lost + self._sum(lost))
-
-    def rollback(self) -> None:
-        """Forget the step."""
-        self._now = self._old
-
-    def commit(self) -> None:
-        """Adopt the step."""
-        self._old = self._now
+        self._terms.trial = _Terms(overstress, relaxed, ahead, self._sum(stored), old.lost + self._sum(lost))
 
     def _sum(self, values: Array) -> float:
         self._density.x.array[self._dofs] = values

@@ -63,7 +63,7 @@ class Prony:
 
 
 class Overstress:
-    """Overstresses of one body, trial and committed.
+    """Overstresses of one body.
 
     Args:
         state: Displacement and time.
@@ -102,20 +102,21 @@ class Overstress:
         F = state.deformation_gradient(state.u)
         entries = [tensor[i, j] for tensor in (self._stress(F), green_lagrange(F)) for i, j in self._pairs]
         self._response = expression(ufl.as_vector(entries), points, mesh)
-        strain, self._S = self._evaluate()
-        self._remember(space)
+        strain, stress = self._evaluate()
+        self._remember(space, stress)
         spring = Spring(mesh, energy, self._pairs, self._cells, degree, scale)
-        self.energies = Maxwell(spring, np.array(prony.strengths), fem.Function(scalars), measure, strain)
+        self.energies = Maxwell(state.memory, spring, np.array(prony.strengths), fem.Function(scalars), measure, strain)
 
-    def _remember(self, space: fem.FunctionSpace) -> None:
+    def _remember(self, space: fem.FunctionSpace, stress: Array) -> None:
         """Histories of a body at rest. In a step the overstress is known + weight × stress."""
         mesh, terms = space.mesh, len(self._prony.times)
         self._known = fem.Function(space)
         self._means = fem.Function(fem.functionspace(mesh, ("DG", 0, (len(self._pairs),))))
         self._weight = fem.Constant(mesh, default_scalar_type(0.0))
-        self._before: tuple[float, Array] = (0.0, np.zeros_like(self._S))
-        self._h: Array = np.zeros((terms, *self._S.shape))
-        self._S_old, self._h_old = self._S, self._h
+        memory = self._state.memory
+        for name, shown in {"known": self._known, "means": self._means, "weight": self._weight}.items():
+            memory.array(f"overstress: {name}", shown)
+        self._points = memory.value("overstress", (stress, np.zeros((terms, *stress.shape))))
         self._decay: Array = np.ones(terms)
         self._gain: Array = np.zeros(terms)
 
@@ -135,31 +136,21 @@ class Overstress:
 
     def begin(self) -> None:
         """Factors of the step whose size the state knows."""
-        self._before = float(self._weight.value), self._known.x.array.reshape(-1, len(self._pairs))[self._dofs]
         self._decay, self._gain = self._prony.factors(float(self._state.dt.value))
         self._weight.value = self._gain.sum()
-        self._know(np.tensordot(self._decay, self._h_old, 1) - self._gain.sum() * self._S_old)
+        stress, overstress = self._points.committed
+        self._know(np.tensordot(self._decay, overstress, 1) - self._gain.sum() * stress)
 
     def evaluate(self) -> None:
         """Overstresses at the end of the step, and their energies. Collective."""
-        strain, self._S = self._evaluate()
+        strain, stress = self._evaluate()
+        stress_old, overstress_old = self._points.committed
         broadcast = (-1, 1, 1, 1)
-        change = self._gain.reshape(broadcast) * (self._S - self._S_old)
-        self._h = self._decay.reshape(broadcast) * self._h_old + change
+        change = self._gain.reshape(broadcast) * (stress - stress_old)
+        overstress = self._decay.reshape(broadcast) * overstress_old + change
+        self._points.trial = stress, overstress
         steps = float(self._state.dt.value) / np.array(self._prony.times)
-        self.energies.evaluate(strain, self._conjugate * self._S, self._conjugate * self._h, steps)
-
-    def rollback(self) -> None:
-        """Forget the step."""
-        self._weight.value, known = self._before
-        self._know(known)
-        self._S, self._h = self._S_old, self._h_old
-        self.energies.rollback()
-
-    def commit(self) -> None:
-        """Adopt the overstresses of the step."""
-        self._S_old, self._h_old = self._S, self._h
-        self.energies.commit()
+        self.energies.evaluate(strain, self._conjugate * stress, self._conjugate * overstress, steps)
 
     def _know(self, values: Array) -> None:
         self._known.x.array.reshape(-1, len(self._pairs))[self._dofs] = values

@@ -1,11 +1,14 @@
 """Kinematics of a pair: partners of the slave points, opening and slide (docs/theory.md §3.5)."""
 
+from dataclasses import dataclass, replace
+
 import basix
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from cutsim.base.assembly import box
+from cutsim.base.memory import Memory
 from cutsim.fields.points import DEGREE
 from cutsim.pairs.outer_surface import Master, OuterSurface, normals
 from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, project
@@ -23,6 +26,38 @@ FACING = 0.5
 WILD = 1e9
 
 
+@dataclass(frozen=True)
+class _Known:
+    """What is known of the points at the end of a step.
+
+    Attributes:
+        slid: Slide so far [length].
+        met: Which of them have a partner.
+        deep: How deep the deepest is [length].
+    """
+
+    slid: Array
+    met: NDArray[np.bool_]
+    deep: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The last search for facets that are near each other.
+
+    Attributes:
+        near: Slave and master facets.
+        nodes: Nodes of slave and master facets at the time.
+        reach: How far it reached [length].
+        version: Its number.
+    """
+
+    near: tuple[Indices, Indices]
+    nodes: tuple[Array, Array]
+    reach: float
+    version: int
+
+
 class PairKinematics:
     """Slave points and their partners on a master surface. Every method is collective.
 
@@ -34,6 +69,8 @@ class PairKinematics:
     is in the reference configuration.
 
     Args:
+        memory: Memory of the run.
+        name: Name of the slave surface.
         slave: The slave surface.
         master: The master surface.
         fixed: Whether pairs are fixed.
@@ -43,27 +80,33 @@ class PairKinematics:
 
     Attributes:
         tables: Shape functions and derivatives at the points of a slave facet.
-        version: Grows when other facets have come near each other.
-        near: Slave and master facets that are near each other.
     """
 
-    def __init__(self, slave: OuterSurface, master: Master, *, fixed: bool, search: float, size: float) -> None:
+    def __init__(
+        self,
+        memory: Memory,
+        name: str,
+        slave: OuterSurface,
+        master: Master,
+        *,
+        fixed: bool,
+        search: float,
+        size: float,
+    ) -> None:
         self.slave, self.master, self.fixed, self._search = slave, master, fixed, search
         shape = slave.shape.element
         places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
         self.tables = slave.shape.values(places)
         self._size, self._margin = size, MARGIN * size
-        self.version = 0
         nodes = slave.reference, master.reference
         points = self._points(nodes[0])
         self._old, self._old_nodes = points, nodes
-        # how deep points were at the start of the step, and which of them had a partner
-        self._deep, self._met = 0.0, np.zeros(len(points.x), dtype=bool)
-        self._look_around(points, nodes, search)
+        slid = np.zeros((len(points.x), points.x.shape[-1] - 1))
+        self._known = memory.value(f"{name}: partners", _Known(slid, np.zeros(len(points.x), dtype=bool)))
+        self._found = memory.value(f"{name}: search", self._look_around(points, nodes, search, 0))
         self._old_hits = self._hits(points, nodes)
         if not fixed:
             self._dig_out(points, nodes)
-        self._slid: Array = np.zeros((len(points.x), points.x.shape[-1] - 1))
         self._offset = np.zeros_like(points.x)
         if fixed:
             self._offset = self.pairs(nodes).jump
@@ -97,10 +140,19 @@ class PairKinematics:
         if not self.fixed:
             self._old_hits = self._hits(self._old, nodes)
 
-    def commit(self, pairs: Pairs) -> None:
-        """Keep the slide, and which points had a partner how deep, at the end of a step."""
-        self._slid = pairs.jump[:, 1:]
-        self._note(pairs.hits)
+    def note(self, pairs: Pairs) -> None:
+        """Trial slide, and which points have a partner how deep, at the end of a step."""
+        self._known.trial = self._known_of(pairs.jump[:, 1:], pairs.hits)
+
+    @property
+    def near(self) -> tuple[Indices, Indices]:
+        """Slave and master facets that are near each other."""
+        return self._found.trial.near
+
+    @property
+    def version(self) -> int:
+        """Number that grows when other facets have come near each other."""
+        return self._found.trial.version
 
     @np.errstate(divide="ignore", invalid="ignore", over="ignore")
     def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
@@ -128,7 +180,8 @@ class PairKinematics:
         """The jump, and its rate with the place on the master facet."""
         frames, y = self._old.frames[hits.points, 1:], self._old_nodes[1][hits.facets]
         before = np.einsum("nb,nbi->ni", values, y) - self._old.x[hits.points]
-        jump = np.column_stack([np.full(len(self._slid), self._search), self._slid])
+        slid = self._known.committed.slid
+        jump = np.column_stack([np.full(len(slid), self._search), slid])
         # surfaces that just touch count as pressed: rounding would decide which points feel the other one
         touch = TOUCH * self._size
         jump[hits.points, 0] = np.where(np.abs(hits.gap) <= touch, -touch, hits.gap)
@@ -149,10 +202,10 @@ class PairKinematics:
     def _points(self, nodes: Array) -> Points:
         return Points.on(nodes, self.slave.sides, self.tables)
 
-    def _note(self, hits: Hits) -> None:
-        self._met = np.zeros(len(self._met), dtype=bool)
-        self._met[hits.points] = True
-        self._deep = max(self.slave.maximum(float(-hits.gap.min(initial=0.0))), 0.0)
+    def _known_of(self, slid: Array, hits: Hits) -> _Known:
+        met = np.zeros(len(slid), dtype=bool)
+        met[hits.points] = True
+        return _Known(slid, met, max(self.slave.maximum(float(-hits.gap.min(initial=0.0))), 0.0))
 
     def _dig_out(self, points: Points, nodes: tuple[Array, Array]) -> None:
         """Find partners of points that are in the other body, deeper than the search, from the start.
@@ -165,17 +218,18 @@ class PairKinematics:
         depth = self._buried(points, nodes, inside)
         while (deepest := self.slave.maximum(depth.max(initial=0.0))) > 0:
             lost = self.slave.total(int(np.count_nonzero(depth)))
-            if self._deep > np.linalg.norm(high - low):
+            deep = self._known.committed.deep
+            if deep > np.linalg.norm(high - low):
                 raise ValueError(
                     f"slave_facets: {lost} points lie in the body of master_facets from the start, about {deepest:.3g} "
                     "deep, and their normals do not meet its surface: let the bodies overlap less, or give all facets "
                     "that face each other"
                 )
             # a ray may be longer than the way to the nearest facet
-            self._met, self._deep = inside, 2 * max(deepest, self._deep)
+            self._known.set(replace(self._known.committed, met=inside, deep=2 * max(deepest, deep)))
             self._old_hits = self._hits(points, nodes)
             depth = self._buried(points, nodes, inside)
-        self._note(self._old_hits)
+        self._known.set(self._known_of(self._known.committed.slid, self._old_hits))
 
     def _buried(self, points: Points, nodes: tuple[Array, Array], inside: NDArray[np.bool_]) -> Array:
         """Distance to the nearest facet of the master of points that are inside and have no partner; else 0.
@@ -199,7 +253,8 @@ class PairKinematics:
     def _hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
         reach = self._reach(nodes)
         if self._moved(nodes, reach):
-            self._look_around(points, nodes, reach)
+            # what has come near is no part of the step: it stays known if the step is given up
+            self._found.set(self._look_around(points, nodes, reach, self.version))
         count = len(self.tables[0])
         slaves, masters = self.near
         of_facet = slaves[:, None] * count + np.arange(count)
@@ -214,7 +269,7 @@ class PairKinematics:
             for now, then in zip(nodes, self._old_nodes, strict=True)
         )
         moved = self.slave.maximum(float(np.nan_to_num(moved, nan=np.inf)))
-        return self._search + self._deep + (moved if moved < WILD * self._margin else 0.0)
+        return self._search + self._known.committed.deep + (moved if moved < WILD * self._margin else 0.0)
 
     def _entered(self, hits: Hits) -> NDArray[np.bool_]:
         """Which partners are in front of their points, near them, or behind because the points have come into the body.
@@ -222,7 +277,7 @@ class PairKinematics:
         What a ray meets far behind its point may else be the far side of a thin body.
         """
         far = hits.gap < -self._search
-        rows = np.flatnonzero(far & ~self._met[hits.points])
+        rows = np.flatnonzero(far & ~self._known.committed.met[hits.points])
         values = self.master.shape.values(hits.xi[rows])[0]
         before = np.einsum("nb,nbi->ni", values, self._old_nodes[1][hits.facets[rows]]) - self._old.x[hits.points[rows]]
         gap = np.einsum("ni,ni->n", before, self._old.frames[hits.points[rows], 0])
@@ -232,16 +287,15 @@ class PairKinematics:
 
     def _moved(self, nodes: tuple[Array, Array], reach: float) -> bool:
         """Whether rays may have come nearer to other facets than the margin since these were last searched."""
-        slave, master = (np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, self._seen, strict=True))
-        farther = max(reach - self._seen_reach, 0.0)
+        found = self._found.trial
+        slave, master = (np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, found.nodes, strict=True))
+        farther = max(reach - found.reach, 0.0)
         total = self.slave.maximum(float(np.nan_to_num(slave + master + farther, nan=np.inf)))
         return self._margin < total < WILD * self._margin
 
-    def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float) -> None:
+    def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float, version: int) -> _Search:
         """Find the facets that are near each other."""
         count, ray = len(self.tables[0]), reach * points.frames[:, 0]
         shape = len(nodes[0]), count, points.x.shape[-1]
         rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
-        self.near = near_facets(rays, nodes[1], self._margin)
-        self._seen, self._seen_reach = nodes, reach
-        self.version += 1
+        return _Search(near_facets(rays, nodes[1], self._margin), nodes, reach, version + 1)

@@ -43,6 +43,7 @@ class PairLaw:
 
     Args:
         state: Displacement and time.
+        name: Name of the surface.
         points: Integration points.
         laws: The laws.
         history: What the points remember of opening and damage.
@@ -53,7 +54,7 @@ class PairLaw:
     """
 
     def __init__(
-        self, state: State, points: FacetPoints, laws: PairLaws, history: InterfaceHistory, pairs: Pairs
+        self, state: State, name: str, points: FacetPoints, laws: PairLaws, history: InterfaceHistory, pairs: Pairs
     ) -> None:
         self._points, self._laws, self._history = points, laws, history
         self._dim = state.mesh.geometry.dim
@@ -80,7 +81,9 @@ class PairLaw:
             share, stick = r.damage[1], laws.stick
             # how a point without partner comes near is not known
             depth = points.at(self._met) * r.penetration
-            self.slip = SlipHistory(state, points, friction, slide, r.pressure, depth, share=share, tolerance=stick)
+            self.slip = SlipHistory(
+                state, name, points, friction, slide, r.pressure, depth, share=share, tolerance=stick
+            )
             shear = [s + share * t for s, t in zip(shear, self.slip.traction, strict=True)]
         traction = ufl.as_vector([r.tension - r.pressure, *shear])
         stiffness = ufl.diff(traction, jump)

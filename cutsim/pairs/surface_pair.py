@@ -1,11 +1,15 @@
 """Large sliding between two outer surfaces with different meshes (docs/theory.md §3.5; thesis 4.28–4.57)."""
 
+from collections.abc import Sequence
+
 import numpy as np
+import ufl
 from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
+from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
-from cutsim.base.terms import AssembledTerm
+from cutsim.base.terms import Term
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
@@ -20,7 +24,7 @@ from cutsim.pairs.surface_pass import SurfacePass, slave_points
 _AXES = "xyz"
 
 
-class SurfacePair(AssembledTerm[SurfacePass]):
+class SurfacePair(Term):
     """Contact, friction or cohesion between two outer surfaces; their meshes need not match.
 
     The traction is integrated over the slave surface.  In two passes each surface is slave once, with half of the
@@ -98,8 +102,17 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         self.passes = tuple(
             SurfacePass(
                 state,
+                f"{name} pass {i + 1}",
                 points[i],
-                PairKinematics(surfaces[i], masters[1 - i], fixed=fixed, search=search or sizes[0], size=sizes[i]),
+                PairKinematics(
+                    state.memory,
+                    f"{name} pass {i + 1}",
+                    surfaces[i],
+                    masters[1 - i],
+                    fixed=fixed,
+                    search=search or sizes[0],
+                    size=sizes[i],
+                ),
                 laws,
                 weight=0.5 if two_pass else 1.0,
             )
@@ -112,12 +125,16 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         points = self.passes[0].points
         return self.law.toughness[0] * points.mean(points.weights.sum(axis=1)) if self.law is not None else 0.0
 
-    @property
-    def pattern(self) -> int:
-        """Number of the sparsity pattern."""
-        return sum(p.pattern for p in self.passes)
+    def residual(self, v: Expr) -> ufl.Form:
+        """No form: all forces are those of the passes."""
+        return ufl.Form([])
 
-    def begin(self, time: float) -> None:
+    @property
+    def assemblers(self) -> Sequence[SurfacePass]:
+        """The passes."""
+        return self.passes
+
+    def begin(self) -> None:
         """The slide of the step counts from the committed displacement."""
         for p in self.passes:
             p.begin()
@@ -176,13 +193,3 @@ class SurfacePair(AssembledTerm[SurfacePass]):
         if self.law is not None:
             columns[f"{name}_broken"] = (first.points.integral(first.history.trial["damage"]), kind)
         return columns
-
-    def rollback(self) -> None:
-        """Forget the trial step."""
-        for p in self.passes:
-            p.rollback()
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-        for p in self.passes:
-            p.commit()

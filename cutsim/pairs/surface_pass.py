@@ -41,6 +41,7 @@ class SurfacePass:
 
     Args:
         state: Displacement and time.
+        name: Name of the slave surface.
         points: Integration points on the slave facets.
         kinematics: Finds the jump.
         laws: Laws.
@@ -53,21 +54,33 @@ class SurfacePass:
         weights: Weights of the points, flattened, times the factor; zero where another rank adds them.
         history: What they remember of opening and damage.
         slip: What they remember of friction, or None.
-        force: Force on the slave surface in the trial state [force].
     """
 
     def __init__(
-        self, state: State, points: FacetPoints, kinematics: PairKinematics, laws: PairLaws, *, weight: float
+        self,
+        state: State,
+        name: str,
+        points: FacetPoints,
+        kinematics: PairKinematics,
+        laws: PairLaws,
+        *,
+        weight: float,
     ) -> None:
         self._state, self.points, self.kinematics, self.weight = state, points, kinematics, weight
         self._dim = state.mesh.geometry.dim
         own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
         self.weights = weight * own.ravel()
-        self.history = InterfaceHistory(points, laws.cohesive, GAUSS if kinematics.fixed else TRAPEZOID, ("held",))
-        self._law = PairLaw(state, points, laws, self.history, kinematics.pairs(self._start()))
+        rule = GAUSS if kinematics.fixed else TRAPEZOID
+        self.history = InterfaceHistory(state.memory, name, points, laws.cohesive, rule, ("held",))
+        self._law = PairLaw(state, name, points, laws, self.history, kinematics.pairs(self._start()))
         self.slip = self._law.slip
         self._seen: Array | None = None
-        self.force = self._force_old = np.zeros(self._dim)
+        self._force = state.memory.value(f"{name}: force", np.zeros(self._dim))
+
+    @property
+    def force(self) -> Array:
+        """Force on the slave surface in the trial state [force]."""
+        return self._force.trial
 
     def _tractions(self, *, linearised: bool) -> Tractions:
         """Tractions for the jump that was found last."""
@@ -102,7 +115,8 @@ class SurfacePass:
         self.history.evaluate(lambda s: self._along(ends, s))
         if self.slip is not None:
             self.slip.evaluate()
-        self.force = self._state.mesh.comm.allreduce(self.point_forces().sum(axis=0))
+        self._force.trial = self._state.mesh.comm.allreduce(self.point_forces().sum(axis=0))
+        self.kinematics.note(self.partners())
 
     def point_forces(self) -> Array:
         """Present forces on the slave at the points, shape (points, dimension); zero where another rank adds them."""
@@ -143,21 +157,6 @@ class SurfacePass:
             total[entry] += value
         return {entry: self.weight * value for entry, value in total.items()}
 
-    def rollback(self) -> None:
-        """Forget the trial step."""
-        self.history.rollback()
-        if self.slip is not None:
-            self.slip.rollback()
-        self.force, self._seen = self._force_old, None
-
-    def commit(self) -> None:
-        """Adopt history, slide and force of the step."""
-        self.kinematics.commit(self.partners())
-        self.history.commit()
-        if self.slip is not None:
-            self.slip.commit()
-        self._force_old = self.force
-
     # -- forces ---------------------------------------------------------------------------------------------------
 
     @property
@@ -165,8 +164,11 @@ class SurfacePass:
         """Number of the sparsity pattern."""
         return self.kinematics.version
 
+    def prepare(self) -> None:
+        """Nothing: partners are found when forces are asked for."""
+
     def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
-        """Add nodal forces, as `cutsim.base.terms.Term.add_forces`."""
+        """Add nodal forces, as `cutsim.base.terms.Assembler.add_forces`."""
         kinematics, pairs = self.kinematics, self.partners()
         tractions = self._tractions(linearised=along is not None)
         rows = nodal_forces.active(kinematics, pairs, tractions)
@@ -180,7 +182,7 @@ class SurfacePass:
         b.setValues(dofs.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
 
     def add_tangent(self, A: PETSc.Mat) -> None:
-        """Add the tangent, as `cutsim.base.terms.Term.add_tangent`."""
+        """Add the tangent, as `cutsim.base.terms.Assembler.add_tangent`."""
         kinematics, pairs, tractions = self.kinematics, self.partners(), self._tractions(linearised=True)
         rows = nodal_forces.active(kinematics, pairs, tractions)
         for some in np.array_split(rows, 1 + len(rows) // _CHUNK):
@@ -191,7 +193,7 @@ class SurfacePass:
                 add_blocks(A, dofs, blocks.reshape(*dofs.shape, dofs.shape[1]))
 
     def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros, as `cutsim.base.terms.Term.add_pattern`."""
+        """Add zeros, as `cutsim.base.terms.Assembler.add_pattern`."""
         dofs = self.dofs(self.kinematics.near_nodes())
         for some in np.array_split(dofs, 1 + len(dofs) // _CHUNK):
             add_blocks(A, some, np.zeros((*some.shape, some.shape[1])))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,15 +15,18 @@ from numpy.typing import NDArray
 from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
 from cutsim.base.checks import nonnegative, require, require_number
 from cutsim.base.kinematics import Expr
+from cutsim.base.terms import Columns, FacetShowing, offering
 from cutsim.base.units import Units
-from cutsim.interface.crack import Crack
 from cutsim.results.output import FieldWriter, HistoryWriter, claim_folder, write_summary
 from cutsim.results.progress import Progress
 
-Columns = dict[str, tuple[float, str]]
 
-#: Fields of a crack, averaged over each facet.
-CRACK_FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
+@dataclass(frozen=True)
+class _Written:
+    """Rows of the history so far, and the time of a step whose fields are not written yet."""
+
+    rows: int = 0
+    pending: float | None = None
 
 
 class Recording:
@@ -73,13 +77,13 @@ class Recording:
         self.history: dict[str, list[float]] = {}
         self._stack = ExitStack()
         self._table: HistoryWriter | None = None
-        self._cracks = [_CrackFields(t) for t in problem.terms if isinstance(t, Crack) and t.law is not None]
+        self._facets = [_FacetFields(t) for t in offering(problem.terms, FacetShowing) if t.facet_fields]
         comm, start = problem.state.mesh.comm, problem.state.time_old
         self._progress = self._stack.enter_context(Progress(until, comm, title, start=start))
-        self._unwritten: float | None = None
+        self._written = problem.state.memory.value(f"recording: {title}", _Written())
         self._fields: FieldWriter | None = None
         if every:
-            surfaces = {c.crack.name: c.functions for c in self._cracks}
+            surfaces = {f.term.name: f.functions for f in self._facets}
             derived = {**problem.fields, **(derived or {})}
             self._fields = self._stack.enter_context(FieldWriter(self.folder, problem.state.u, derived, surfaces))
 
@@ -101,15 +105,16 @@ class Recording:
         self._table.append(row)
         shown = {label: row[column] for label, column in self._show.items()}
         self._progress.update(report.time, step=report.number, **shown, iterations=report.outcome.iterations)
-        self._unwritten = report.time
+        written = self._written.committed
+        self._written.set(replace(written, rows=written.rows + 1, pending=report.time))
         if self._every and report.number % self._every == 0:
             self.write_fields(report.time)
 
     def write_fields(self, time: float) -> None:
         """Write the fields of the present state. Collective."""
-        self._unwritten = None
-        for crack in self._cracks:
-            crack.update()
+        self._written.set(replace(self._written.committed, pending=None))
+        for facets in self._facets:
+            facets.update()
         if self._fields is not None:
             self._fields.write(time)
 
@@ -154,8 +159,8 @@ class Recording:
         # only these ends are known to be met by all ranks
         together = kind is None or issubclass(kind, StepError | Interrupted)
         with self._stack:
-            if together and self._unwritten is not None:
-                self.write_fields(self._unwritten)
+            if together and (pending := self._written.committed.pending) is not None:
+                self.write_fields(pending)
             if not together:
                 state.verdict.doubt("failed", f"ended at time {state.time_old:.6g} of {self._until:.6g} by {error!r}")
         summary = MPI.COMM_SELF if not together else state.mesh.comm
@@ -164,16 +169,16 @@ class Recording:
         self._progress.say(f"{self._title}: {state.verdict}")
 
 
-class _CrackFields:
-    """Facet means of a crack, as functions on its submesh."""
+class _FacetFields:
+    """Facet means of a term as functions on the mesh of its facets."""
 
-    def __init__(self, crack: Crack) -> None:
-        self.crack = crack
-        space = fem.functionspace(crack.points.submesh, ("DG", 0))
+    def __init__(self, term: FacetShowing) -> None:
+        self.term = term
+        space = fem.functionspace(term.submesh, ("DG", 0))
         self._dofs = space.dofmap.list[:, 0]
-        self.functions = [fem.Function(space, name=name) for name in CRACK_FIELDS]
+        self.functions = [fem.Function(space, name=name) for name in term.facet_fields]
 
     def update(self) -> None:
         """Copy the present facet means."""
         for function in self.functions:
-            function.x.array[self._dofs] = self.crack.facet_mean(function.name)
+            function.x.array[self._dofs] = self.term.facet_mean(function.name)

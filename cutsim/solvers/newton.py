@@ -135,6 +135,10 @@ class NonlinearProblem:
             self._force = self._iterations.force
         return outcome
 
+    def refresh(self) -> None:
+        """Forget what was factorised."""
+        self._iterations.linear.forget_pattern()
+
     def residual(self) -> PETSc.Vec:
         """Internal minus external forces at the present u, known ones and the constrained rows included.
 

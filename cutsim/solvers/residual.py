@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import Array, owned_vector
-from cutsim.base.terms import Term
+from cutsim.base.terms import Assembler
 
 
 class Residual:
@@ -20,7 +20,7 @@ class Residual:
         a: Their compiled tangent, through which prescribed increments are lifted.
         u: The displacement.
         bcs: Dirichlet conditions.
-        terms: Terms that assemble themselves.
+        assemblers: Forces that are no form.
 
     Attributes:
         n: Number of owned dofs.
@@ -30,9 +30,9 @@ class Residual:
     """
 
     def __init__(
-        self, L: fem.Form, a: fem.Form, u: fem.Function, bcs: Sequence[fem.DirichletBC], terms: Sequence[Term]
+        self, L: fem.Form, a: fem.Form, u: fem.Function, bcs: Sequence[fem.DirichletBC], assemblers: Sequence[Assembler]
     ) -> None:
-        self._L, self._a, self._u, self._bcs, self._terms = L, a, u, list(bcs), tuple(terms)
+        self._L, self._a, self._u, self._bcs, self._assemblers = L, a, u, list(bcs), tuple(assemblers)
         V = u.function_space
         layout = V.dofmap.index_map, V.dofmap.index_map_bs
         self._comm: MPI.Comm = V.mesh.comm
@@ -71,8 +71,8 @@ class Residual:
             lift: Whether to add what the increments to the prescribed values bring through the tangent, which costs as
                 much as the forces.
         """
-        for term in self._terms:
-            term.prepare()
+        for assembler in self._assemblers:
+            assembler.prepare()
         r = self._r.array
         r[:] = 0.0
         fem.assemble_vector(r, self._L)
@@ -80,11 +80,11 @@ class Residual:
             fem.apply_lifting(r, [self._a], [self._bcs], [self._u.x.array], -1.0)
         self._r.scatter_reverse(la.InsertMode.add)
         r[: self.n] += self.known
-        if self._terms:
-            self._add_terms(lift)
+        if self._assemblers:
+            self._add_assembled(lift)
         return r[: self.n]
 
-    def _add_terms(self, lift: bool) -> None:
+    def _add_assembled(self, lift: bool) -> None:
         """Add the forces of terms that assemble themselves, and the lifting of prescribed increments."""
         jump = None
         if lift:
@@ -93,8 +93,8 @@ class Residual:
             jump[self.held] = -self.violation(self._u.x.array)
             self._lifted.scatter_forward()
         self._added.set(0.0)
-        for term in self._terms:
-            term.add_forces(self._added, jump)
+        for assembler in self._assemblers:
+            assembler.add_forces(self._added, jump)
         self._added.assemble()
         self._r.array[: self.n] += self._added.array_r
 

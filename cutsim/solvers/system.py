@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base import compat
-from cutsim.base.terms import Multiplier, Term
+from cutsim.base.terms import Assembler, Multiplier
 from cutsim.solvers.multipliers import Multipliers
 from cutsim.solvers.residual import Residual
 from cutsim.solvers.tangent import Tangent
@@ -23,13 +23,13 @@ class Structure:
 
     Args:
         symmetric: Whether the tangent is symmetric.
-        terms: Terms with forces that are not in the form: they assemble themselves.
+        assemblers: Forces that are not in the form.
         multipliers: Further unknowns, on which the form depends, with their equations.
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
     """
 
     symmetric: bool = False
-    terms: Sequence[Term] = ()
+    assemblers: Sequence[Assembler] = ()
     multipliers: Sequence[Multiplier] = ()
     interface_dofs: NDArray[np.int32] | None = None
 
@@ -70,8 +70,8 @@ class System:
         self._u, self._bcs, self.structure = u, list(bcs), structure
         J = ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
         L, a = (compat.form(form, entity_maps=entity_maps) for form in (F, J))
-        self.forces = Residual(L, a, u, bcs, structure.terms)
-        self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.terms)
+        self.forces = Residual(L, a, u, bcs, structure.assemblers)
+        self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers)
         self._multipliers = Multipliers(structure.multipliers, u, bcs)
         self.size = int(self.comm.allreduce(len(self.unknowns)))
         self.reaction: NDArray[np.float64] = np.zeros(len(self.forces.held))
@@ -126,8 +126,8 @@ class System:
         self._multipliers.assemble()
 
     def _prepare(self) -> None:
-        for term in self.structure.terms:
-            term.prepare()
+        for assembler in self.structure.assemblers:
+            assembler.prepare()
 
     def resistance(self, motions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Forces against motions at the present u; see `NonlinearProblem.resistance`."""

@@ -8,7 +8,7 @@ from dolfinx.fem import petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from cutsim.base.terms import Term
+from cutsim.base.terms import Assembler
 from cutsim.solvers.preconditioners import rigid_body_modes
 
 
@@ -23,14 +23,16 @@ class Tangent:
         a: The compiled form.
         V: Its space; displacements give the matrix their rigid-body modes as near-nullspace.
         symmetric: Whether it is symmetric.
-        terms: Terms that assemble themselves.
+        assemblers: Forces that are no form.
 
     Attributes:
         A: The matrix.
     """
 
-    def __init__(self, a: fem.Form, V: fem.FunctionSpace, symmetric: bool, terms: Sequence[Term] = ()) -> None:
-        self._a, self._V, self._symmetric, self._terms = a, V, symmetric, tuple(terms)
+    def __init__(
+        self, a: fem.Form, V: fem.FunctionSpace, symmetric: bool, assemblers: Sequence[Assembler] = ()
+    ) -> None:
+        self._a, self._V, self._symmetric, self._assemblers = a, V, symmetric, tuple(assemblers)
         if V.mesh.comm.size == 1:
             self._csr = fem.create_matrix(a, block_mode=la.BlockMode.expanded)
             n = len(self._csr.indptr) - 1
@@ -47,21 +49,21 @@ class Tangent:
 
     @property
     def outdated(self) -> bool:
-        """Whether the pattern of a term has changed: `renew` before the next `assemble`."""
-        return self._patterns != tuple(term.pattern for term in self._terms)
+        """Whether a pattern has changed: `renew` before the next `assemble`."""
+        return self._patterns != tuple(assembler.pattern for assembler in self._assemblers)
 
     def renew(self) -> None:
-        """Make the matrix anew for the present patterns of the terms."""
-        self._patterns = tuple(term.pattern for term in self._terms)
-        if self._terms:
+        """Make the matrix anew for the present patterns."""
+        self._patterns = tuple(assembler.pattern for assembler in self._assemblers)
+        if self._assemblers:
             self._destroy_sum()
             self._added = PETSc.Mat().create(self._forms.comm)
             self._added.setSizes(self._forms.getSizes())
             self._added.setBlockSize(self._V.dofmap.index_map_bs)
             self._added.setType(PETSc.Mat.Type.AIJ)
             self._added.setUp()
-            for term in self._terms:
-                term.add_pattern(self._added)
+            for assembler in self._assemblers:
+                assembler.add_pattern(self._added)
             self._added.assemble()
             # a matrix in which nothing was inserted would lose its pattern
             self._assemble_forms(())
@@ -89,8 +91,8 @@ class Tangent:
 
     def _add(self, added: PETSc.Mat, bcs: Sequence[fem.DirichletBC]) -> None:
         added.zeroEntries()
-        for term in self._terms:
-            term.add_tangent(added)
+        for assembler in self._assemblers:
+            assembler.add_tangent(added)
         added.assemble()
         # for the time being the vector of the diagonal marks the free rows
         self._diagonal.set(1.0)

@@ -61,7 +61,7 @@ class JIntegral:
         length: float = 1.0,
     ) -> None:
         gdim = solid.state.mesh.geometry.dim
-        plain = not (solid.state.axisymmetric or solid.assembles)
+        plain = not (solid.state.axisymmetric or solid.assemblers)
         require("solid", solid.name, plain, "a body that is not axisymmetric, without mixed elements")
         require_numbers("tip", tip, length=gdim)
         require_numbers("direction", direction, length=gdim)

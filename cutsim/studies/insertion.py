@@ -101,8 +101,9 @@ class Insertion:
         parts, plate = ToolParts(contacts, tool), fixture.support(body, frame)
         problem = Mechanics(
             body.state,
-            [*body.terms, *contacts, parts],
+            [*body.terms, *contacts],
             [plate, *fixture.supports(body, frame, motion.entry_time)],
+            observers=[parts],
             **(mechanics or {}),
         )
         factor, areas = 2.0 if fixture.halved(body) else 1.0, tuple(CutArea(crack) for crack in body.cracks)

@@ -1,6 +1,7 @@
 """Check whether a rigid tool has passed through the surface of the body, where it would push outwards."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -30,6 +31,14 @@ class Touched(Protocol):
         """Present "depth" of the points in the tool and "facing" of its normal and theirs. Collective."""
 
 
+@dataclass(frozen=True)
+class _Seen:
+    """Contact of all patches at the end of a step, and depth and facing of the point that is nearest to the tool."""
+
+    contact: tuple[Mapping[str, Values], ...]
+    nearest: tuple[float, float]
+
+
 class Passing:
     """Check on which side of the surfaces a tool is. Every method is collective.
 
@@ -43,27 +52,27 @@ class Passing:
 
     def __init__(self, tool: RigidTool, patches: Sequence[Touched]) -> None:
         self._tool, self._patches = tool, patches
-        self._seen = self._seen_old = [p.contact() for p in patches]
-        if count := self._count([_pushed(now) for now in self._seen]):
-            depth = max(p.surface.points.maximum(now["depth"]) for p, now in zip(patches, self._seen, strict=True))
+        seen = tuple(p.contact() for p in patches)
+        if count := self._count([_pushed(now) for now in seen]):
+            depth = max(p.surface.points.maximum(now["depth"]) for p, now in zip(patches, seen, strict=True))
             raise ValueError(
                 f"path of {tool.name!r}: at its start {count} points of the body lie behind the middle of the tool, up "
                 f"to {depth:.3g} deep in it, from where it would push them outwards; let it begin outside the body, or "
                 "less deep in it"
             )
-        self._nearest = self._nearest_old = _nearest(patches, self._seen)
-        nearest, facing = self._nearest
+        nearest, facing = _nearest(patches, seen)
         if facing > _BEHIND and nearest < 0:
             tool.state.verdict.doubt(
                 f"{tool.name}: start",
                 f"{tool.name} begins {-nearest:.3g} behind the nearest point of what it can touch: inside the body, or "
                 "beyond it",
             )
+        self._known = tool.state.memory.value(f"{tool.name}: passing", _Seen(seen, (nearest, facing)))
 
     def objection(self) -> str | None:
         """In words, whether the tool has come through the surface in this step; None if it has not."""
-        self._seen = [p.contact() for p in self._patches]
-        both = list(zip(self._seen_old, self._seen, strict=True))
+        seen, old = tuple(p.contact() for p in self._patches), self._known.committed
+        both = list(zip(old.contact, seen, strict=True))
         # a rim that friction folds turns slowly, step by step, and is left alone
         pushed = [_pushed(now) & (now["facing"] - then["facing"] > _TURN) for then, now in both]
         turned = [(then["facing"] < -_BEHIND) & (now["facing"] > _BEHIND) for then, now in both]
@@ -72,15 +81,11 @@ class Passing:
         passed = f"{self._tool.name} has passed through the surface of the body"
         if count := self._count(pushed):
             return f"{passed} at {count} points"
-        self._nearest = _nearest(self._patches, self._seen)
-        (depth_old, facing_old), (depth, facing) = self._nearest_old, self._nearest
+        self._known.trial = _Seen(seen, _nearest(self._patches, seen))
+        (depth_old, facing_old), (depth, facing) = old.nearest, self._known.trial.nearest
         # a tool smaller than a facet may meet no point before its middle is behind them
         between = facing > 0 and facing - facing_old > 2 * _TURN and min(depth_old, depth) <= 0
         return f"{passed} between its points" if between else None
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-        self._seen_old, self._nearest_old = self._seen, self._nearest
 
     def _met(self, some: Sequence[NDArray[np.bool_]]) -> list[NDArray[np.bool_]]:
         """Which of some points have been in the tool during the step."""

@@ -38,9 +38,9 @@ class RigidTool(Term, ABC):
         start = _position(path, 0.0, gdim)
         self.name, self.state, self.path = name, state, path
         self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
-        self._position_old = start.copy()
-        self._action: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
-        self._action_old: _Action = self._action
+        self._position = state.memory.array(f"{name}: position", self.position)
+        none: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
+        self._action = state.memory.value(f"{name}: force and moment", none)
         state.verdict.suppose(self._untouched, f"{name} has never touched the body")
 
     @property
@@ -56,27 +56,27 @@ class RigidTool(Term, ABC):
     @property
     def displacement(self) -> NDArray[np.float64]:
         """Increment of the tool's position in the step [length]."""
-        return np.asarray(self.position.value - self._position_old)
+        return np.asarray(self._position.trial - self._position.committed)
 
     def act(self, force: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
         """Note force and moment on the tool in the trial state, for `evaluate`."""
-        self._action = force, moment
+        self._action.trial = force, moment
 
-    def begin(self, time: float) -> None:
+    def begin(self) -> None:
         """Move the tool to its position at the end of the step."""
-        self.position.value[:] = _position(self.path, time, len(self.position.value))
+        self.position.value[:] = _position(self.path, self.state.time, len(self.position.value))
 
     def external_work(self) -> float:
         """Work of the tool on the body in the step: mean force times increment. Collective."""
-        return float(-0.5 * (self._action[0] + self._action_old[0]) @ self.displacement)
+        return float(-0.5 * (self._action.trial[0] + self._action.committed[0]) @ self.displacement)
 
     def force(self) -> NDArray[np.float64]:
         """Force on the tool in the trial state, from the virtual work of a rigid translation [force]."""
-        return self._action[0]
+        return self._action.trial[0]
 
     def moment(self) -> NDArray[np.float64]:
         """Moment on the tool about its reference point, from the virtual work of a rigid rotation."""
-        return self._action[1]
+        return self._action.trial[1]
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Position, force and moment of the tool, areas that stick and slip. Collective."""
@@ -116,16 +116,6 @@ class RigidTool(Term, ABC):
     @property
     def _untouched(self) -> str:
         return f"{self.name}: untouched"
-
-    def rollback(self) -> None:
-        """Move the tool back to the start of the step."""
-        self.position.value[:] = self._position_old
-        self._action = self._action_old
-
-    def commit(self) -> None:
-        """Adopt position, force and moment."""
-        self._position_old[:] = self.position.value
-        self._action_old = self._action
 
 
 def _position(path: Path, time: float, gdim: int) -> NDArray[np.float64]:

@@ -30,6 +30,7 @@ class Patch:
 
     Args:
         state: Displacement and time.
+        name: Name of the tool.
         surface: The surface.
         shape: Signed distance of the tool.
         position: Its present position.
@@ -48,6 +49,7 @@ class Patch:
     def __init__(
         self,
         state: State,
+        name: str,
         surface: Surface,
         shape: Shape,
         position: fem.Constant,
@@ -69,6 +71,7 @@ class Patch:
         if friction is not None:
             self.slip = SlipHistory(
                 state,
+                name,
                 surface.points,
                 friction,
                 surface.restrict(state.u) - position,
@@ -167,7 +170,7 @@ class ToolContact(RigidTool):
         self.shape, self.contact, self.friction = shape, contact, friction
         self.symmetric = friction is None
         law = None if friction is None else completed(friction, contact.stiffness)
-        self.patches = tuple(Patch(state, s, shape, self.position, contact, law, temperature) for s in surfaces)
+        self.patches = tuple(Patch(state, name, s, shape, self.position, contact, law, temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
         self._passing = Passing(self, self.patches)
@@ -226,19 +229,6 @@ class ToolContact(RigidTool):
             for entry, value in slip.energies().items():
                 total[entry] += value
         return total
-
-    def rollback(self) -> None:
-        """Move the tool back to the start of the step."""
-        super().rollback()
-        for slip in self.slips:
-            slip.rollback()
-
-    def commit(self) -> None:
-        """Adopt position, forces and slip."""
-        super().commit()
-        self._passing.commit()
-        for slip in self.slips:
-            slip.commit()
 
 
 def doubt_units(verdict: Verdict, name: str, shape: Shape, body: float) -> None:

@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 
 import ufl
 
-from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
-from cutsim.base.terms import Term
+from cutsim.base.terms import Columns
 from cutsim.fields.points import Values
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.tool_contact import Patch, ToolContact
@@ -18,14 +17,14 @@ _QUANTITIES = ("force", "friction", "work")
 _Books = dict[tuple[str, str], float]
 
 
-class ToolParts(Term):
-    """Force and friction work of tip and shaft of a tool; adds nothing to the balance.
+class ToolParts:
+    """Force and friction work of tip and shaft of a tool, as an observer of the mechanics.
 
     A point of the body counts to the part beside which it is now; the shaft begins at `Pointed.shaft_height`.  The
     parts sum up to the tool's force and friction work, as they come from the same tractions at the same points.
 
     Args:
-        tools: The tool, or its halves; they come before this term in the mechanics.
+        tools: The tool, or its halves.
         shape: Shape of the whole tool.
         name: Name in messages.
     """
@@ -35,16 +34,12 @@ class ToolParts(Term):
         self.name = name
         self._shaft = shape.shaft_height
         self._books = [(patch, _evaluator(patch, shape)) for tool in tools for patch in tool.patches]
-        self._trial: _Books = {(quantity, part): 0.0 for quantity in _QUANTITIES for part in PARTS}
-        self._old = self._trial
-
-    def residual(self, v: Expr) -> ufl.Form:
-        """Nothing."""
-        return ufl.Form([])
+        none: _Books = {(quantity, part): 0.0 for quantity in _QUANTITIES for part in PARTS}
+        self._known = tools[0].state.memory.value(name, none)
 
     def evaluate(self) -> None:
         """Forces of the trial state and work up to it. Collective."""
-        self._trial = {key: self._old[key] if key[0] == "work" else 0.0 for key in self._old}
+        total = {key: value if key[0] == "work" else 0.0 for key, value in self._known.committed.items()}
         for patch, evaluate in self._books:
             now, points = evaluate(), patch.surface.points
             densities = {
@@ -53,28 +48,25 @@ class ToolParts(Term):
                 "work": patch.dissipation(),
             }
             beside = {"tip": now["height"] < self._shaft, "shaft": now["height"] >= self._shaft}
-            for quantity, part in self._trial:
-                self._trial[quantity, part] += points.integral(beside[part] * densities[quantity])
+            for quantity, part in total:
+                total[quantity, part] += points.integral(beside[part] * densities[quantity])
+        self._known.trial = total
+
+    def record(self) -> Columns:
+        """No columns of its own."""
+        return {}
 
     def force(self, part: str) -> float:
         """Force on a part against the direction of push, pressure and friction, in the trial state [force]."""
-        return self._trial["force", part]
+        return self._known.trial["force", part]
 
     def friction(self, part: str) -> float:
         """What friction has in it [force]."""
-        return self._trial["friction", part]
+        return self._known.trial["friction", part]
 
     def friction_work(self, part: str) -> float:
         """Friction work on a part up to the trial state [energy]."""
-        return self._trial["work", part]
-
-    def rollback(self) -> None:
-        """Back to the forces and the work of the committed state."""
-        self._trial = self._old
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-        self._old = self._trial
+        return self._known.trial["work", part]
 
 
 def _evaluator(patch: Patch, shape: Pointed) -> Callable[[], dict[str, Values]]:

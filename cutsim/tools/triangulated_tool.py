@@ -4,14 +4,16 @@ from collections.abc import Sequence
 
 import basix
 import numpy as np
-from dolfinx import fem
+import ufl
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import add_blocks, moment
 from cutsim.base.checks import positive, require, require_number
+from cutsim.base.kinematics import Expr
+from cutsim.base.memory import RememberedArray
 from cutsim.base.signatures import checked
-from cutsim.base.terms import AssembledTerm
+from cutsim.base.terms import Assembler
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
@@ -33,21 +35,20 @@ class RigidSurface:
 
     Args:
         triangulation: The surface, relative to the reference point.
-        now: Present position of the reference point; it is read whenever the surface is asked for.
-        before: Its position at the start of the step, likewise.
+        position: Position of the reference point; it is read whenever the surface is asked for.
     """
 
-    def __init__(self, triangulation: Triangulation, now: fem.Constant, before: Array) -> None:
+    def __init__(self, triangulation: Triangulation, position: RememberedArray) -> None:
         kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[triangulation.points.shape[1]]
         self.shape = Shape(basix.create_element(basix.ElementFamily.P, kind, 1))
-        self._corners, self._now, self._before = triangulation.corners, now, before
+        self._corners, self._position = triangulation.corners, position
         self.sides: Array = np.ones(len(self._corners))
-        self.reference: Array = self._corners + before
+        self.reference: Array = self._corners + position.committed
         self.global_nodes: Indices = np.full(triangulation.facets.shape, -1)
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, at the start or the end of the step, whatever the displacement."""
-        return self._corners + (self._before if start else self._now.value)
+        return self._corners + (self._position.committed if start else self._position.trial)
 
     def gather(self, values: Array) -> Array:
         """Zero: the surface has no unknowns."""
@@ -58,7 +59,22 @@ class RigidSurface:
         return inside_surface(points, self.reference)
 
 
-class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
+class _Touch(SurfacePass):
+    """The points of a body against a rigid surface, which has no nodes: the pattern never changes."""
+
+    @property
+    def pattern(self) -> int:
+        """Always the same."""
+        return 0
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Add zeros for all facets. Collective."""
+        slave = self.kinematics.slave
+        dofs = self.dofs(slave.global_nodes[slave.owned])
+        add_blocks(A, dofs, np.zeros((*dofs.shape, dofs.shape[1])))
+
+
+class TriangulatedTool(RigidTool):
     """Contact between a rigid tool of triangles and an outer surface of the body.
 
     The points of the body find the tool along their own normals, as in a pair of surfaces: the traction turns with the
@@ -100,28 +116,30 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
         require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
         points = slave_points(state, facets, state.measures.exterior(facets))
         size = points.mean(facet_size(state.mesh, points.facets))
-        master = RigidSurface(surface, self.position, self._position_old)
+        master = RigidSurface(surface, self._position)
         self.contact, self._normal_size = contact, points.mean(normal_size(state.mesh, points.facets))
         slave = OuterSurface(state.V, points.facets)
-        kinematics = PairKinematics(slave, master, fixed=False, search=search or size, size=size)
+        kinematics = PairKinematics(state.memory, name, slave, master, fixed=False, search=search or size, size=size)
         laws = PairLaws(None, contact, friction, None, None)
-        self.touch = SurfacePass(state, points, kinematics, laws, weight=1.0)
-        self.passes = (self.touch,)
+        self.touch = _Touch(state, name, points, kinematics, laws, weight=1.0)
 
     @property
     def slips(self) -> Sequence[SlipHistory]:
         """Memory of friction of the surface."""
         return [] if self.touch.slip is None else [self.touch.slip]
 
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """Add zeros for all facets: the pattern never changes. Collective."""
-        slave = self.touch.kinematics.slave
-        dofs = self.touch.dofs(slave.global_nodes[slave.owned])
-        add_blocks(A, dofs, np.zeros((*dofs.shape, dofs.shape[1])))
+    def residual(self, v: Expr) -> ufl.Form:
+        """No form: all forces are those of the contact."""
+        return ufl.Form([])
 
-    def begin(self, time: float) -> None:
+    @property
+    def assemblers(self) -> Sequence[Assembler]:
+        """The contact."""
+        return (self.touch,)
+
+    def begin(self) -> None:
         """Move the tool; the slide of the step counts from the committed displacement."""
-        super().begin(time)
+        super().begin()
         self.touch.begin()
 
     def evaluate(self) -> None:
@@ -146,13 +164,3 @@ class TriangulatedTool(AssembledTerm[SurfacePass], RigidTool):
     def energies(self) -> dict[str, float]:
         """Energy of the contact penalty, friction work, and work of the pressure that neither holds. Collective."""
         return self.touch.energies()
-
-    def rollback(self) -> None:
-        """Forget the trial step."""
-        super().rollback()
-        self.touch.rollback()
-
-    def commit(self) -> None:
-        """Adopt the trial step."""
-        self.touch.commit()
-        super().commit()
