@@ -1,6 +1,8 @@
 """The pages say what the code does: their Python runs, and their examples pass the tests of what they extend."""
 
 import re
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -188,6 +190,32 @@ def test_tangent_of_cone(shape, friction):
     surface = Surface.exterior(b.state, b.face(2, 1.0))
     tool = test_tangents.touch(b, shape, (0.4, 0.5, 0.9), [surface], friction)
     test_tangents.assert_slope_two(tool, b.state, test_tangents.smooth(b.state.V, 4, 0.02), 0.05)
+
+
+# -- term, step control ------------------------------------------------------------------------------------------------
+
+
+def test_gravity():
+    """A block in a frictionless box sinks by ρ g L²/2M; the floor carries its weight and the audit closes."""
+    page = run_page("adding_a_term")
+    young, poisson, weight = page["young"], page["poisson"], page["density"]
+    modulus = young * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))
+    assert page["sunk"] == pytest.approx(weight / (2 * modulus), rel=1e-9)
+    last = page["rows"][-1]
+    assert last["floor_force"] == pytest.approx(weight, rel=1e-9) and last["gravity_force_y"] == pytest.approx(-weight)
+    assert abs(last["energy_closure"]) < 1e-10
+
+
+def test_step_control():
+    """Each step follows from the iterations of the one before; a rejected one is halved."""
+    page = run_page("adding_a_step_control")
+    control, reports = page["control"], page["reports"]
+    assert reports[-1].time == pytest.approx(1.0) and reports[0].dt == pytest.approx(control.first)
+    for before, after in pairwise(reports[:-1]):  # the last one is shortened to end at 1
+        assert after.dt == pytest.approx(before.dt * (control.iterations / before.outcome.iterations) ** 0.5)
+    assert control.next(replace(reports[1], refusal="too large")) == reports[1].dt / 2
+    with pytest.raises(ValueError, match="smallest = 1"):
+        page["Aimed"](first=0.1, largest=0.5, smallest=1.0)
 
 
 def test_page_of_the_api_is_up_to_date(monkeypatch):

@@ -1,4 +1,4 @@
-"""All that a problem remembers, to go on from later, in another process."""
+"""Checkpoints: the committed state of a problem, from which another process can continue."""
 
 from cutsim.analysis.stepping import Problem
 from cutsim.base.memory import Snapshot

@@ -1,4 +1,4 @@
-"""The balance of momentum of one step: the terms added up, and the energy audit."""
+"""Balance of momentum of one step: the sum of the terms, and the energy audit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Equilibrium at each time, or motion with inertia: what differs between a static and a dynamic analysis."""
+"""Static and dynamic analysis: equilibrium at each time, or motion with inertia."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class Motion(Protocol):
-    """What an analysis adds to the static terms.
+    """Protocol of an analysis: what it adds to the static terms.
 
     Attributes:
         inertia: The inertia of the bodies, or None.
@@ -57,7 +57,7 @@ class Motion(Protocol):
 
 
 class QuasiStatic:
-    """Equilibrium at each time.
+    """Static analysis: equilibrium at each time.
 
     Args:
         state: Displacement and time.
@@ -107,7 +107,7 @@ class QuasiStatic:
 
 
 class Dynamic:
-    """Motion with inertia.
+    """Dynamic analysis: motion with inertia.
 
     Args:
         inertia: Inertia of the bodies.

@@ -120,7 +120,7 @@ class StepError(RuntimeError):
 
 @dataclass(frozen=True)
 class StepReport:
-    """One step that was tried.
+    """Report of a step that was tried.
 
     Attributes:
         number: Its number: steps accepted so far, this one included.
@@ -150,7 +150,7 @@ class StepReport:
 
 
 class Control(Protocol):
-    """How large steps are, and which are accepted; a value, of which `StepControl` is one."""
+    """Protocol of a step control: the sizes of the steps, and which are accepted; see docs/adding_a_step_control.md."""
 
     @property
     def first(self) -> float:
@@ -315,7 +315,7 @@ def run(
 
 @dataclass(frozen=True)
 class Pace:
-    """What is known of the next step.
+    """Step control in use and size of the next step.
 
     Attributes:
         control: The control that has chosen its size.

@@ -1,4 +1,4 @@
-"""The one memory of a run: named quantities, each with a trial and a committed value.
+"""Memory of a run: named quantities, each with a trial and a committed value.
 
 Whoever has to remember something from step to step registers it, and reads and sets its trial value.  A step that is
 accepted is committed here, one that is given up is rolled back here; both restore values bit for bit.

@@ -30,7 +30,7 @@ Columns = dict[str, tuple[float, str]]
 
 
 class Assembler(Protocol):
-    """Forces that are no form, with their tangent."""
+    """Protocol of forces that are not a form, with their tangent."""
 
     @property
     def pattern(self) -> int:
@@ -55,7 +55,7 @@ class Assembler(Protocol):
 
 
 class Term:
-    """A term of a balance; every member but `residual` has a neutral default.
+    """Term of a balance; every member but `residual` has a neutral default. See docs/adding_a_term.md.
 
     Attributes:
         name: Name in messages and in the columns of the history.
@@ -276,7 +276,7 @@ class Joining(Protocol):
 
 
 class Observer(Protocol):
-    """What watches terms without adding to a balance.
+    """Observer of terms, which adds nothing to a balance.
 
     Attributes:
         name: Its name.

@@ -22,7 +22,7 @@ from cutsim.fields.measures import Measures
 
 @dataclass(frozen=True)
 class Clock:
-    """When a step is.
+    """Clock of a step: its end, size and number.
 
     Attributes:
         time: Its end [time].

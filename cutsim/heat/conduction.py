@@ -20,7 +20,7 @@ from cutsim.heat.balance import HeatTerm
 
 
 class Moved(Protocol):
-    """What has a deformation gradient."""
+    """Protocol of a body with a deformation gradient."""
 
     def deformation_gradient(self, u: Expr) -> Expr:
         """Deformation gradient of a displacement, 3 × 3."""

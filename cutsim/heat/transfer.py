@@ -1,4 +1,4 @@
-"""The balance of heat of one step: the terms added up, and the audit of heat."""
+"""Balance of heat of one step: the sum of the terms, and the audit of heat."""
 
 from collections.abc import Mapping, Sequence
 from itertools import chain, count

@@ -1,4 +1,4 @@
-"""What the balances of momentum and of heat share: terms, held values, one unknown and its solver."""
+"""Base of the balances of momentum and heat: terms, prescribed values, one unknown and its solver."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Generic, Protocol, TypeVar
@@ -19,7 +19,7 @@ from cutsim.solvers.system import Structure
 
 
 class Held(Prescribed, Protocol):
-    """A value that is prescribed on some dofs and may change in time.
+    """Protocol of a value that is prescribed on some dofs and may change in time.
 
     Attributes:
         bc: Its Dirichlet condition.
@@ -45,7 +45,7 @@ H = TypeVar("H", bound=Held)
 
 
 class Balance(Generic[T, H]):
-    """A balance of one step.
+    """Balance of one step.
 
     Args:
         name: Name of the balance in the memory.

@@ -1,4 +1,4 @@
-"""Newton's method by PETSc's SNES: outcome of a solve, and the iterations that lead to it."""
+"""Newton iterations by PETSc's SNES, and the outcome of a solve."""
 
 from dataclasses import dataclass, replace
 
@@ -35,7 +35,7 @@ _SENTENCES = {code: reason.value for reason, code in _CODES.items()} | {
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a solve.
+    """Outcome of a solve.
 
     Attributes:
         converged: Whether equilibrium was reached; if not, u is the last iterate.
@@ -66,7 +66,7 @@ class Outcome:
 
 
 class Iterations:
-    """The iterations of Newton's method on a system, by PETSc's SNES. Every method is collective.
+    """Newton iterations on a system, by PETSc's SNES. Every method is collective.
 
     Args:
         system: The equations.
