@@ -36,12 +36,12 @@ def step(path):
     ax.set_aspect("equal")
     ax.axis("off")
     column = [
-        ("begin", "time and step size: state", BLUE),
-        ("move", "tools, loads, supports: constants only", BLUE),
-        ("solve", "trial displacement: solver, Uzawa", BLUE),
-        ("evaluate", "trial history, work along the path, audit", BLUE),
-        ("accept?", "damage growth, energy closure", GREY),
-        ("commit", "trial → committed; only here", GREEN),
+        ("begin", "clock: time and step size", BLUE),
+        ("move", "tools, loads, supports: constants", BLUE),
+        ("solve", "Newton's method, augmentation", BLUE),
+        ("evaluate", "trial history, work, energy audit", BLUE),
+        ("accept?", "step control: damage, energy closure", GREY),
+        ("commit", "memory: trial → committed", GREEN),
         ("record", "history row, fields, progress", GREEN),
     ]
     y = [8.0 - 1.35 * i for i in range(len(column))]
@@ -51,7 +51,7 @@ def step(path):
     for above, below, label in zip(y, y[1:], labels, strict=False):
         arrow(ax, (0, above - 0.47), (0, below + 0.47), label, shift=(0.12, 0.0))
     x = 6.6
-    box(ax, x, y[2], "roll back", "displacement, constants,\nmultipliers: bit for bit", RED, 3.8, 1.15)
+    box(ax, x, y[2], "roll back", "memory: committed\nvalues, bit for bit", RED, 3.8, 1.15)
     ax.texts[-2].set_y(y[2] + 0.34)
     box(ax, x, y[1] + 0.25, "next line search", "same step again", RED, 3.8)
     box(ax, x, y[4], "smaller step", "dt × cut", RED, 3.8)
