@@ -16,11 +16,12 @@ from cutsim.base.assembly import nodal_forces
 from cutsim.base.compat import form
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
+from cutsim.bodies.spring import Spring
+from cutsim.bodies.tensor_points import TensorPoints
 from cutsim.fields.state import State
 from cutsim.materials.elastic import IsochoricNeoHookean, NeoHookean, StVenantKirchhoff
 from cutsim.materials.fibres import DispersedFibres, ExponentialFibres, Reinforced
 from cutsim.materials.rubbers import Ogden, Yeoh
-from cutsim.materials.spring import Spring
 from cutsim.materials.viscoelastic import Prony
 from cutsim.results.output import interpolate
 
@@ -229,8 +230,8 @@ def test_changes_of_volume_cost_the_split_little():
 def spring(material):
     """The part of an energy that relaxes, at the points of one cell in the plane."""
     domain = mesh.create_unit_square(MPI.COMM_SELF, 1, 1, mesh.CellType.quadrilateral)
-    pairs = [(0, 0), (0, 1), (1, 1), (2, 2)]
-    return Spring(domain, lambda F: material.energy(F)[0], pairs, np.array([0], np.int32), 2, material.young)
+    points = TensorPoints(domain, np.array([0], np.int32), degree=2)
+    return Spring(points, lambda F: material.energy(F)[0], material.young)
 
 
 @pytest.mark.parametrize("isochoric", [False, True])

@@ -17,6 +17,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.kinematics import Expr, green_lagrange, small_strain
+from cutsim.bodies.elasticity import Law
 from cutsim.fields.space import vertex_space
 from cutsim.fields.state import State
 from cutsim.materials.elastic import Material, volumetric_energy
@@ -48,7 +49,7 @@ class PressureField:
         ValueError: The volumetric part of the strain energy is no square of a change of volume.
     """
 
-    def __init__(self, state: State, material: Material, law: Material, cells: NDArray[np.int32] | None) -> None:
+    def __init__(self, state: State, material: Material, law: Law, cells: NDArray[np.int32] | None) -> None:
         self._measure = _measure(material)
         self._law = law
         space = vertex_space(state.V, cells)

@@ -1,31 +1,29 @@
 """A deformable body: hyperelastic bulk, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
-import basix
 import numpy as np
 import ufl
-from dolfinx import default_scalar_type, fem
-from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.base.assembly import integrate, nodal_forces
+from cutsim.base.assembly import integrate
 from cutsim.base.checks import nonnegative, positive, require, require_number
-from cutsim.base.compat import evaluate, expression, form
-from cutsim.base.kinematics import Expr, cofactor, deformation_gradient, green_lagrange
-from cutsim.base.parameters import with_constants
+from cutsim.base.compat import form
+from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
-from cutsim.base.terms import Multiplier, Term
-from cutsim.bodies.pressure import PressureField
+from cutsim.base.terms import Assembler, Multiplier, Term
+from cutsim.bodies.contributions import Contribution, Heating, KelvinVoigt
+from cutsim.bodies.elasticity import Elasticity
+from cutsim.bodies.formulations import FORMULATIONS, Measures
+from cutsim.bodies.overstress import Overstress
 from cutsim.bodies.quadrature import strain_energy_measures
-from cutsim.bodies.volume_change import VolumeChange
+from cutsim.bodies.volume_ratio import VolumeRatio
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
-from cutsim.materials.elastic import Material, volumetric_energy
+from cutsim.materials.elastic import Material
 from cutsim.materials.thermoelastic import ThermoElastic
-from cutsim.materials.viscoelastic import Overstress, Prony
+from cutsim.materials.viscoelastic import Prony
 
 # volume ratio below which an element is no longer to be trusted
 _FLAT = 0.1
@@ -53,10 +51,11 @@ class Solid(Term):
         temperature: The temperature that acts on the body; with `thermoelastic` only.
 
     Attributes:
-        measures: Measures over the body that integrate the two parts of the strain energy.
+        formulation: How the strain energy enters the virtual work.
+        contributions: What is added to elasticity.
 
     Raises:
-        ValueError: A parameter is outside its range.
+        ValueError: A parameter is outside its range, or does not go with another one.
     """
 
     @checked
@@ -75,77 +74,50 @@ class Solid(Term):
         thermoelastic: ThermoElastic | None = None,
         temperature: Temperature | None = None,
     ) -> None:
-        gdim = state.mesh.geometry.dim
-        require("plane", plane, plane == "strain" or gdim == 2, "'strain' on a 3-D mesh")
-        require("plane", plane, plane == "strain" or not state.axisymmetric, "'strain' in an axisymmetric problem")
         require_number("viscosity", viscosity, nonnegative)
         require_number("density", density, positive.or_none)
-        # there λ₃ would depend on the overstress
-        require("plane", plane, plane == "strain" or relaxation is None, "'strain' for a material that relaxes")
-        self.name = name
-        self.state = state
-        self.material = material
-        self._law = with_constants(state.mesh, material)
-        self.plane = plane
-        self.viscosity = viscosity
-        self.density = density
-        self._couple(thermoelastic, temperature)
-        self._viscosity = fem.Constant(state.mesh, default_scalar_type(viscosity))
-        self.cells = cells
-        self.measures = strain_energy_measures(state, material, volumetric, cells, name)
-        self._mixed = self._projected() if volumetric == "mixed" else None
-        self._pressure = self._continuous() if volumetric == "taylor-hood" else None
-        self._overstress = None if relaxation is None else self._relaxing(relaxation)
-        self._energy_form = form(self._stored(state.u))
-        self._viscous_form = form(self._viscous_work()) if viscosity else None
-        self._rate_form = form(self._viscous_forces(ufl.TestFunction(state.V))) if viscosity else None
-        self._viscous = state.memory.value(f"{name}: viscous work", 0.0)
-        self._thermal = state.memory.value(f"{name}: thermal work", 0.0)
-        if thermoelastic is not None and temperature is not None:
-            self._start_heating(thermoelastic.reference, temperature)
-
-    def _couple(self, law: ThermoElastic | None, temperature: Temperature | None) -> None:
-        together = (law is None) == (temperature is None)
+        together = (thermoelastic is None) == (temperature is None)
         require("temperature", temperature, together, "given with thermoelastic, and only then")
-        same = temperature is None or temperature.state is self.state
-        require("temperature", temperature, same, "a temperature made with the state of the body")
-        constant = law is None or law.softening == 0
-        # there λ₃ would have to be solved for with another ratio of the moduli at each temperature
-        require("plane", self.plane, self.plane == "strain" or constant, "'strain' if thermoelastic.softening is not 0")
-        self.temperature = temperature
-        self._thermoelastic = None if law is None else with_constants(self.state.mesh, law)
+        self.name, self.state, self.material, self.cells, self.density = name, state, material, cells, density
+        elasticity = Elasticity.of(state, material, plane)
+        if thermoelastic is not None and temperature is not None:
+            elasticity = elasticity.expanding(thermoelastic, temperature)
+        measures = strain_energy_measures(state, material, volumetric, cells, name)
+        self.formulation = FORMULATIONS[volumetric](elasticity, measures, cells)
+        self._energy_form = form(self.formulation.stored(state.u))
+        self._volume = VolumeRatio(self.formulation, cells)
+        self.contributions = tuple(self._contributions(viscosity, relaxation, thermoelastic))
 
-    def _start_heating(self, reference: float, temperature: Temperature) -> None:
-        """Count what heat has brought before the start, from the reference temperature on."""
-        self._temperature_seen = fem.Function(temperature.space)
-        self._temperature_seen.x.array[:] = reference
-        self._heating_form = form(self._heating(temperature.value))
-        self._thermal.set(-integrate(self._heating_form))
-        self._seen = self.state.memory.value(f"{self.name}: temperature", temperature.value.x.array.copy(), self._show)
-        self._show(self._seen.committed)
+    def _contributions(
+        self, viscosity: float, relaxation: Prony | None, expansion: ThermoElastic | None
+    ) -> Iterator[Contribution]:
+        if viscosity:
+            yield KelvinVoigt(self.name, self.state, viscosity, self.measures[0])
+        if relaxation is not None:
+            yield Overstress(self.name, self.formulation, relaxation, self.cells)
+        if expansion is not None:
+            yield Heating(self.name, self.formulation, expansion.reference)
 
-    def _show(self, seen: NDArray[np.float64]) -> None:
-        self._temperature_seen.x.array[:] = seen
+    @property
+    def measures(self) -> Measures:
+        """Measures over the body that integrate the two parts of the strain energy."""
+        return self.formulation.measures
 
     def deformation_gradient(self, u: Expr) -> Expr:
         """Deformation gradient of the body, 3 × 3, with the out-of-plane stretch of the plane assumption."""
-        return self._deformation_gradient(u, self._temperature())
+        return self.formulation.elasticity.deformation_gradient(u)
 
     def energy_parts(self, F: Expr) -> tuple[Expr, Expr]:
         """Strain energy per reference volume of a deformation gradient, in the parts that `measures` integrate.
 
-        At the present temperature, and with the present pressure of Taylor–Hood elements.
+        At the present temperature, and with the present pressure where the formulation has one of its own.
         """
-        return self._energy(F, self._temperature())
+        return self.formulation.parts(F)
 
     def first_piola(self, u: Expr) -> Expr:
         """First Piola–Kirchhoff stress P = ∂W/∂F with overstresses, 3 × 3 [stress]."""
         F = ufl.variable(self.deformation_gradient(u))
-        if self._mixed is not None:
-            P = ufl.diff(self._energy(F, None)[0], F) + self._mixed.pressure * cofactor(F)
-        else:
-            P = ufl.diff(sum(self.energy_parts(F)), F)
-        return P if self._overstress is None else P + self._overstress.piola(F)
+        return sum((c.piola(F) for c in self.contributions), start=self.formulation.piola(F))
 
     def cauchy_stress(self, u: Expr) -> Expr:
         """Cauchy stress σ = P Fᵀ / J, 3 × 3 [stress]."""
@@ -154,73 +126,55 @@ class Solid(Term):
 
     def strain_energy_density(self, u: Expr) -> Expr:
         """Strain energy per reference volume W [energy/length³]."""
-        return sum(self._parts(u, self._temperature()))
+        return sum(self.energy_parts(self.deformation_gradient(u)))
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of the elastic and viscous stresses."""
-        u = self.state.u
-        work = ufl.derivative(self._stored(u), u, v)
-        if self._mixed is not None:
-            J = ufl.det(self.deformation_gradient(u))
-            work += self._mixed.pressure * ufl.derivative(J, u, v) * self.measures[0]
-        if self.viscosity:
-            work += self._viscous_forces(v)
-        if self._overstress is not None:
-            work += self._overstress.residual(v)
-        return work
+        return sum((c.residual(v) for c in self.contributions), start=self.formulation.residual(v))
 
     @property
     def fields(self) -> Mapping[str, Expr]:
         """The pressure of Taylor–Hood elements, > 0 in tension [stress]."""
-        return {} if self._pressure is None else {f"{self.name}_pressure": self._pressure.shown}
+        return {f"{self.name}_{field}": value for field, value in self.formulation.fields.items()}
 
     @property
     def multipliers(self) -> Sequence[Multiplier]:
         """The pressure of Taylor–Hood elements."""
-        if self._pressure is None:
-            return ()
-        unknown = self._pressure.unknown
-        q = ufl.TestFunction(unknown.function_space)
-        return (Multiplier(unknown, ufl.derivative(self._stored(self.state.u), unknown, q)),)
+        return self.formulation.multipliers
 
     @property
-    def assemblers(self) -> Sequence[VolumeChange]:
+    def assemblers(self) -> Sequence[Assembler]:
         """The tangent that goes through the projected volume change of mixed elements."""
-        return () if self._mixed is None else (self._mixed,)
+        return self.formulation.assemblers
 
     def begin(self) -> None:
-        """Relax the overstress over the step."""
-        if self._overstress is not None:
-            self._overstress.begin()
+        """Relax overstresses over the step."""
+        for part in self.contributions:
+            part.begin()
 
     def evaluate(self) -> None:
         """Add the viscous dissipation of the step, and what the change of temperature adds. Collective."""
-        if self._viscous_form is not None:
-            self._viscous.trial = self._viscous.committed + integrate(self._viscous_form)
-        if self._overstress is not None:
-            self._overstress.evaluate()
-        if self.temperature is not None:
-            self._thermal.trial = self._thermal.committed - integrate(self._heating_form)
-            self._seen.trial = self.temperature.value.x.array.copy()
+        for part in self.contributions:
+            part.evaluate()
 
     def rate_forces(self) -> NDArray[np.float64] | None:
         """Viscous forces. Collective."""
-        return None if self._rate_form is None else nodal_forces(self._rate_form)
+        forces = [f for part in self.contributions if (f := part.rate_forces()) is not None]
+        return np.sum(forces, axis=0) if forces else None
 
     def energies(self) -> dict[str, float]:
         """Strain energy, work of viscous stresses and minus the strain energy brought by heat so far. Collective."""
-        if self._mixed is not None:
-            self._mixed.prepare()
-        strain, viscous = integrate(self._energy_form), self._viscous.trial
-        if self._overstress is not None:
-            strain += self._overstress.energies.stored
-            viscous += self._overstress.energies.lost
-        return {"strain": strain, "viscous": viscous, "thermoelastic": self._thermal.trial}
+        for assembler in self.assemblers:
+            assembler.prepare()
+        entries = {"strain": integrate(self._energy_form), "viscous": 0.0, "thermoelastic": 0.0}
+        for name, value in (item for part in self.contributions for item in part.energies().items()):
+            entries[name] += value
+        return entries
 
     @property
     def viscous_work(self) -> float:
         """Work of the Kelvin–Voigt viscosity so far, in the trial state [energy]."""
-        return self._viscous.trial
+        return sum(part.regularising_work for part in self.contributions)
 
     def watch(self) -> None:
         """Doubt elements that are almost flat. Collective."""
@@ -239,103 +193,4 @@ class Solid(Term):
 
     def smallest_jacobian(self) -> float:
         """Smallest det F at the integration points. Collective."""
-        owned = self.state.mesh.topology.index_map(self.state.mesh.topology.dim).size_local
-        cells = np.arange(owned, dtype=np.int32) if self.cells is None else self.cells[self.cells < owned]
-        values = evaluate(self._jacobian, self.state.mesh, cells)
-        local = float(np.nan_to_num(values, nan=-np.inf).min()) if values.size else np.inf
-        return float(self.state.mesh.comm.allreduce(local, op=MPI.MIN))
-
-    @cached_property
-    def _jacobian(self) -> fem.Expression:
-        cell = basix.CellType[self.state.mesh.topology.cell_name()]
-        points = basix.make_quadrature(cell, self.measures[0].metadata()["quadrature_degree"])[0]
-        return expression(ufl.det(self.deformation_gradient(self.state.u)), points, self.state.mesh)
-
-    def _relaxing(self, relaxation: Prony) -> Overstress:
-        def energy(F: Expr) -> Expr:
-            return self.energy_parts(F)[0]
-
-        return Overstress(self.state, relaxation, energy, self.measures[0], self.cells, scale=self.material.young)
-
-    def _temperature(self) -> Expr | None:
-        return None if self.temperature is None else self.temperature.value
-
-    def _deformation_gradient(self, u: Expr, T: Expr | None) -> Expr:
-        F = self.state.deformation_gradient(u)
-        if self.plane == "strain":
-            return F
-        if self._thermoelastic is None:
-            return deformation_gradient(u, self._law.plane_stress_stretch(F))
-        stretch = self._thermoelastic.stretch(T)
-        return deformation_gradient(u, stretch * self._law.plane_stress_stretch(F / stretch))
-
-    def _energy(self, F: Expr, T: Expr | None) -> tuple[Expr, Expr]:
-        """Both parts of the strain energy per reference volume."""
-        if self._pressure is not None:
-            return self._law.energy(F)[0], self._pressure.energy(F)
-        if self._thermoelastic is None:
-            return self._law.energy(F)
-        stretch, factor = self._thermoelastic.stretch(T), self._thermoelastic.shear_factor(T)
-        shear, volumetric = self._law.energy(F / stretch)
-        return factor * stretch**3 * shear, stretch**3 * volumetric
-
-    def _parts(self, u: Expr, T: Expr | None) -> tuple[Expr, Expr]:
-        """Both parts of the strain energy per reference volume; mixed elements know that of the state only."""
-        shear, volumetric = self._energy(self._deformation_gradient(u, T), T)
-        return shear, volumetric if self._mixed is None else self._volumetric(self._mixed.value)
-
-    def _volumetric(self, J: Expr) -> Expr:
-        """Volumetric part of the strain energy as a function of the volume change."""
-        return self._law.energy(J ** (1 / 3) * ufl.Identity(3))[1]
-
-    def _projected(self) -> VolumeChange:
-        self._check_mixed("mixed")
-        cell = self.state.mesh.topology.cell_name()
-        require("volumetric", "mixed", cell in ("quadrilateral", "hexahedron"), f"'reduced' on a {cell}")
-        kind = type(self.material).__name__
-        require("volumetric", "mixed", _by_volume(self.material), f"'full' or 'reduced' for {kind}")
-        J = ufl.det(self.deformation_gradient(self.state.u))
-        return VolumeChange(self.state, J, self._volumetric, self.measures[0], self.cells)
-
-    def _continuous(self) -> PressureField:
-        self._check_mixed("taylor-hood")
-        degree = self.state.V.ufl_element().degree
-        require("volumetric", "taylor-hood", degree == 2, f"'mixed' or 'reduced' for degree {degree}")
-        return PressureField(self.state, self.material, self._law, self.cells)
-
-    def _check_mixed(self, volumetric: str) -> None:
-        require("volumetric", volumetric, self.plane == "strain", "'full' or 'reduced' in plane stress")
-        require("volumetric", volumetric, self.temperature is None, "'full' or 'reduced' with thermal expansion")
-
-    def _stored(self, u: Expr, T: Expr | None = None) -> ufl.Form:
-        shear, volumetric = self._parts(u, self._temperature() if T is None else T)
-        dx, dx_volumetric = self.measures
-        return shear * dx + volumetric * dx_volumetric
-
-    def _heating(self, T: Expr) -> ufl.Form:
-        """Strain energy brought by the change of temperature since the last equilibrium, trapezoidal in u."""
-        new, old = self.state.u, self.state.u_old
-        seen = self._temperature_seen
-        total = self._stored(new, T) - self._stored(new, seen) + self._stored(old, T) - self._stored(old, seen)
-        return 0.5 * total
-
-    def _viscous_forces(self, v: Expr) -> ufl.Form:
-        E, change = self._strain()
-        rate = change / self.state.dt
-        return self._viscosity * ufl.inner(rate, ufl.derivative(E, self.state.u, v)) * self.measures[0]
-
-    def _viscous_work(self) -> ufl.Form:
-        _, change = self._strain()
-        return self._viscosity / self.state.dt * ufl.inner(change, change) * self.measures[0]
-
-    def _strain(self) -> tuple[Expr, Expr]:
-        """Green–Lagrange strain, and its change in the step."""
-        new, old = (green_lagrange(self.state.deformation_gradient(w)) for w in (self.state.u, self.state.u_old))
-        return new, new - old
-
-
-def _by_volume(material: Material) -> bool:
-    """Whether the volumetric part is a function of det F: a stretch and a growth of the same volume tell."""
-    stretch, growth = np.diag([2.0, 1.0, 1.0]), 2 ** (1 / 3) * np.eye(3)
-    first, second = (volumetric_energy(material, F) for F in (stretch, growth))
-    return abs(first - second) < 1e-9 * abs(first)
+        return self._volume.smallest()

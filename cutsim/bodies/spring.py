@@ -1,39 +1,23 @@
 """Strain energy evaluated at points, and the strain that belongs to a stress (docs/materials.md)."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
-import basix
-import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
-from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from numpy.typing import NDArray
 
-from cutsim.base.compat import evaluate, expression
+from cutsim.base.assembly import Array
+from cutsim.base.compat import expression
 from cutsim.base.kinematics import Expr
+from cutsim.bodies.tensor_points import TensorPoints
 
 logger = logging.getLogger(__name__)
-
-Array = NDArray[np.float64]
 
 _ITERATIONS = 30
 _HALVINGS = 12
 _TOLERANCE = 1e-11
-
-
-def symmetric_tensor(components: Expr, pairs: Sequence[tuple[int, int]]) -> Expr:
-    """The symmetric tensor, 3 × 3, of its components.
-
-    Args:
-        components: A vector that begins with the components.
-        pairs: Row and column of each, the row not below the column; the others are zero.
-    """
-    order = {pair: k for k, pair in enumerate(pairs)}
-    places = [[order.get((min(i, j), max(i, j))) for j in range(3)] for i in range(3)]
-    return ufl.as_matrix([[0 if k is None else components[k] for k in row] for row in places])
 
 
 class Spring:
@@ -45,50 +29,35 @@ class Spring:
     Making it is collective.
 
     Args:
-        mesh: The mesh.
+        points: The points.
         energy: Strain energy per reference volume as a function of the deformation gradient.
-        pairs: Rows and columns of the components of strain, among them the three on the diagonal.
-        cells: Local cells.
-        degree: Degree of the quadrature rule.
         scale: A stress by which to judge convergence, such as Young's modulus.
 
     Attributes:
-        cells: The cells.
+        points: The points.
     """
 
-    def __init__(
-        self,
-        mesh: Mesh,
-        energy: Callable[[Expr], Expr],
-        pairs: Sequence[tuple[int, int]],
-        cells: NDArray[np.int32],
-        degree: int,
-        scale: float,
-    ) -> None:
-        self._mesh, self.cells, self._scale = mesh, cells, scale
+    def __init__(self, points: TensorPoints, energy: Callable[[Expr], Expr], scale: float) -> None:
+        self.points, self._scale = points, scale
         self._warned = False
-        self._order = {pair: k for k, pair in enumerate(pairs)}
-        kind = basix.CellType[mesh.topology.cell_name()]
-        points = basix.make_quadrature(kind, degree)[0]
-        element = basix.ufl.quadrature_element(kind.name, value_shape=(len(pairs) + 1,), degree=degree)
-        space = fem.functionspace(mesh, element)
-        self._dofs = space.dofmap.list[cells]
-        self._strain = fem.Function(space)
+        self._order = {pair: k for k, pair in enumerate(points.pairs)}
+        size = len(points.pairs)
+        self._strain = fem.Function(points.space(size + 1))
         y = ufl.variable(self._strain)
-        C = ufl.Identity(3) + 2 * symmetric_tensor(y, pairs)
+        C = ufl.Identity(3) + 2 * points.tensor(y)
         W = energy(_cholesky(C))
-        self._energy = expression(W, points, mesh)
+        self._energy = expression(W, points.points, points.mesh)
         self._isochoric = self._ignores_volume()
-        unknowns = range(len(pairs) + self._isochoric)
-        slope = ufl.diff(W + 0.5 * y[len(pairs)] * ufl.ln(ufl.det(C)), y)
+        unknowns = range(size + self._isochoric)
+        slope = ufl.diff(W + 0.5 * y[size] * ufl.ln(ufl.det(C)), y)
         curvature = ufl.diff(slope, y)
         entries = [slope[i] for i in unknowns] + [curvature[i, j] for i in unknowns for j in unknowns]
-        self._newton = expression(ufl.as_vector(entries), points, mesh)
+        self._newton = expression(ufl.as_vector(entries), points.points, points.mesh)
 
     @property
     def undeformed(self) -> Array:
         """Strain of the undeformed body."""
-        return np.zeros((*self._dofs.shape, len(self._order) + 1))
+        return np.zeros((*self.points.dofs.shape, len(self._order) + 1))
 
     def energy(self, strain: Array) -> Array:
         """Strain energy per reference volume, shape (cells, points)."""
@@ -155,19 +124,18 @@ class Spring:
 
     def _ignores_volume(self) -> bool:
         """Whether growth leaves the energy of a stretched body as it is. Collective."""
-        stretched = np.zeros((*self._dofs.shape, len(self._order)))
+        stretched = np.zeros((*self.points.dofs.shape, len(self._order)))
         for i, stretch in enumerate((1.3, 1.1, 0.9)):
             stretched[..., self._order[i, i]] = 0.5 * (stretch**2 - 1)
         self._isochoric = True
         strain, W = self.undeformed, self.energy(self.reduced(stretched))
         strain[..., :-1] = stretched
         changes = bool(np.any(np.abs(self.energy(strain) - W) > 1e-9 * np.abs(W)))
-        return not self._mesh.comm.allreduce(changes, MPI.LOR)
+        return not self.points.mesh.comm.allreduce(changes, MPI.LOR)
 
     def _evaluate(self, compiled: fem.Expression, y: Array) -> Array:
-        self._strain.x.array.reshape(-1, len(self._order) + 1)[self._dofs] = y
-        size = int(np.prod(compiled.ufl_expression.ufl_shape))
-        return evaluate(compiled, self._mesh, self.cells).reshape(*self._dofs.shape, size)
+        self._strain.x.array.reshape(-1, len(self._order) + 1)[self.points.dofs] = y
+        return self.points.values(compiled)
 
 
 def _cholesky(C: Expr) -> Expr:

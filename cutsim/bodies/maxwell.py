@@ -14,14 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 from dolfinx import fem
-from numpy.typing import NDArray
 
-from cutsim.base.assembly import integrate
+from cutsim.base.assembly import Array, integrate
 from cutsim.base.compat import form
 from cutsim.base.memory import Memory
-from cutsim.materials.spring import Spring
-
-Array = NDArray[np.float64]
+from cutsim.bodies.spring import Spring
 
 
 @dataclass(frozen=True)
@@ -47,29 +44,24 @@ class Maxwell:
     """Stored and dissipated energy of the overstresses. Collective.
 
     Args:
+        name: Name in the memory.
         memory: Memory of the run.
         spring: The strain energy that relaxes.
         strengths: gᵢ of the series.
-        density: Function of one value at each integration point, for sums over the body.
         measure: Measure over the body.
         strain: Components of strain at the start, at which there is no overstress.
     """
 
     def __init__(
-        self,
-        memory: Memory,
-        spring: Spring,
-        strengths: Array,
-        density: fem.Function,
-        measure: ufl.Measure,
-        strain: Array,
+        self, name: str, memory: Memory, spring: Spring, strengths: Array, measure: ufl.Measure, strain: Array
     ) -> None:
-        self._spring, self._strengths, self._density = spring, strengths, density
-        self._dofs = density.function_space.dofmap.list[spring.cells]
-        self._integral = form(density * measure)
+        self._spring, self._strengths = spring, strengths
+        # of energy, for sums over the body
+        self._density = fem.Function(spring.points.space())
+        self._integral = form(self._density * measure)
         rest = np.zeros((len(strengths), *strain.shape))
         relaxed = np.stack([spring.reduced(strain)] * len(strengths))
-        self._terms = memory.value("maxwell", _Terms(rest, relaxed, rest))
+        self._terms = memory.value(name, _Terms(rest, relaxed, rest))
 
     @property
     def stored(self) -> float:
@@ -106,7 +98,7 @@ class Maxwell:
         self._terms.trial = _Terms(overstress, relaxed, ahead, self._sum(stored), old.lost + self._sum(lost))
 
     def _sum(self, values: Array) -> float:
-        self._density.x.array[self._dofs] = values
+        self._density.x.array[self._spring.points.dofs] = values
         return integrate(self._integral)
 
 
