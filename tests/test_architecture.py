@@ -1,12 +1,17 @@
 """Imports flow one way: from ready-made studies down to pure mathematics."""
 
 import ast
+import inspect
+import pkgutil
+from dataclasses import is_dataclass
 from graphlib import TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import cutsim
+import cutsim.materials
 
 SOURCES = Path(cutsim.__file__).parent
 # a package imports from those before it
@@ -39,3 +44,13 @@ def test_imports_flow_one_way(package):
 def test_no_module_imports_itself_through_others():
     graph = {f"cutsim.{path.parent.name}.{path.stem}": imports(path) for path in SOURCES.glob("*/*.py")}
     TopologicalSorter(graph).prepare()  # raises CycleError
+
+
+def test_materials_are_frozen_dataclasses():
+    """What has a memory or assembles is no material; protocols and bases without fields are."""
+    for module in pkgutil.iter_modules(cutsim.materials.__path__):
+        classes = inspect.getmembers(import_module(f"cutsim.materials.{module.name}"), inspect.isclass)
+        for name, kind in classes:
+            if kind.__module__ == f"cutsim.materials.{module.name}":
+                frozen = is_dataclass(kind) and kind.__dataclass_params__.frozen
+                assert frozen or "__init__" not in vars(kind) or getattr(kind, "_is_protocol", False), name
