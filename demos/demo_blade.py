@@ -162,7 +162,7 @@ def push(
     begun = time.perf_counter()
     young, poisson, strength = silicone
     dim = domain.mesh.geometry.dim
-    law = Exponential.from_parameters(strength=strength, toughness=setting.toughness)
+    law = Exponential(strength=strength, toughness=setting.toughness)
     forward, lateral = (0.0, -1.0, 0.0)[:dim], (1.0, 0.0, 0.0)[:dim]
     cut = Insertion.build(
         cracked_block(domain, NeoHookean(young, poisson), law, viscosity=VISCOSITY),
@@ -193,7 +193,7 @@ def push(
     summary = summarise(cut, history, law, time.perf_counter() - begun)
     if dim == 2:
         section = 2 * setting.mesh["Lx"] * young / (1 - poisson**2)
-        summary["steady_force_per_width"] = steady_force(law.toughness[0], 1.0, section)
+        summary["steady_force_per_width"] = steady_force(law.toughness, 1.0, section)
     recording.summary(summary)
     return summary
 
@@ -210,7 +210,7 @@ def summarise(cut: Insertion, history: History, law: Exponential, seconds: float
     start = cut.motion.start_depth
     late = depth >= end - 0.5 * (end - start)
     summary: Summary = {
-        "toughness_given": law.toughness[0],
+        "toughness_given": law.toughness,
         "toughness_in_the_books": audited_toughness(history, start + 0.4 * (end - start), end, cut.symmetry_factor),
         "mean_force_per_width_second_half": float(np.trapezoid(force[late], depth[late]) / np.ptp(depth[late])) / width,
         "largest_force": float(force.max()),
@@ -240,7 +240,7 @@ def draw(cut: Insertion, history: History, law: Exponential, out: Path, temperat
     dim = cut.state.mesh.geometry.dim
     width = 1.0 if dim == 2 else WIDTH
     if cut.state.mesh.comm.rank == 0:
-        expected = {"$G_c w$": law.toughness[0] * width}
+        expected = {"$G_c w$": law.toughness * width}
         plot_curves(
             out / "force.png",
             [Curve(history["depth"], history["force"], "force on the blade")],

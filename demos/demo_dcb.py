@@ -102,7 +102,7 @@ class Specimen:
     @property
     def toughness(self) -> float:
         """G_c [N/mm]."""
-        return self.law.toughness[0]
+        return self.law.toughness
 
     def beams(self, plane: str = "strain") -> CantileverBeams:
         """Beam theory for the specimen."""
@@ -120,7 +120,7 @@ class Specimen:
 
 ISOTROPIC = Specimen(
     material=LinearElastic(200e3, 0.3),
-    law=Exponential.from_parameters(strength=57.0, toughness=0.28),
+    law=Exponential(strength=57.0, toughness=0.28),
     height=1.5,
     width=1.0,
     length=70.0,
@@ -132,7 +132,7 @@ ISOTROPIC = Specimen(
 )
 THESIS = Specimen(
     material=LinearElastic(50e3, 0.48),
-    law=Exponential.from_parameters(strength=2.5, opening=0.001),
+    law=Exponential(strength=2.5, opening=0.001),
     height=4.0,
     width=20.0,
     length=125.0,

@@ -108,7 +108,7 @@ class Specimen:
     @property
     def toughness(self) -> float:
         """G_IIc [N/mm]."""
-        return self.law.toughness[1]
+        return self.law.shear_toughness
 
     def theory(self, friction: float = 0.0) -> EndNotchedBeam:
         """Beam theory for a unit width."""
@@ -118,7 +118,7 @@ class Specimen:
 
 FULL = Specimen(
     material=LinearElastic(200e3, 0.3),
-    law=Exponential.from_parameters(strength=50.0, toughness=0.25, shear_strength=200.0, shear_toughness=1.0),
+    law=Exponential(strength=50.0, toughness=0.25, shear_strength=200.0, shear_toughness=1.0),
 )
 QUICK = replace(FULL, size=0.75, layers=2, deflections=(0.9, 1.14), steps=(6, 30))
 
@@ -174,7 +174,7 @@ class Beam:
 
         The sharp front of theory is where the bond carries its strength: where it slides by ε_t/√2.
         """
-        at_strength = self.bond and crack_front(self.bond, 0, "sliding", self.bond.law.eps_t / np.sqrt(2))
+        at_strength = self.bond and crack_front(self.bond, 0, "sliding", self.bond.law.shear_opening / np.sqrt(2))
         front = {"front": (at_strength, "length")} if self.bond else {}
         return front | {
             "deflection": (-columns["load_displacement"][0], "length"),

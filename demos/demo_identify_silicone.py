@@ -124,7 +124,7 @@ def cut(
     domain: TaggedMesh, specimen: Specimen, solid: NeoHookean, strength: float, values: dict[str, float]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Depth and force per width [N/mm] while the blade is pushed."""
-    bond = Exponential.from_parameters(strength=strength, toughness=values["toughness"])
+    bond = Exponential(strength=strength, toughness=values["toughness"])
     problem = Insertion.build(
         cracked_block(domain, solid, bond, viscosity=0.002),
         Blade(HALF_ANGLE, specimen.radius, HALF_THICKNESS),

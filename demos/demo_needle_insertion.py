@@ -91,7 +91,7 @@ def main(
     begun = time.perf_counter()
     setting = SETTINGS[dim, quick]
     end = depth or setting.depth
-    law = Exponential.from_parameters(strength=setting.strength, toughness=toughness or setting.toughness)
+    law = Exponential(strength=setting.strength, toughness=toughness or setting.toughness)
     rough = friction if friction is not None else (0.1, 0.0)[dim - 2]
     cut = problem(setting, law, rough, dim, None if once else end)
     until = cut.time_of(end, 1 if once else 2)
@@ -132,7 +132,7 @@ def problem(setting: Setting, law: Exponential, friction: float, dim: int, turni
 def summarise(cut: Insertion, history: History, parts: History, law: Exponential, seconds: float) -> Summary:
     """Headline numbers of a run; the parts of the force are those of the last window of the first push."""
     summary: Summary = {
-        "toughness_given": law.toughness[0],
+        "toughness_given": law.toughness,
         "largest_force": float(history["force"].max()),
         "depth": float(history["depth"].max()),
         "new_area": cut.symmetry_factor * float(history["crack_broken"].max()),

@@ -66,8 +66,8 @@ MESH = Path(__file__).parent.parent / "meshes" / "senb.geo"
 W, S, B, A = 20.0, 80.0, 10.0, 9.0
 STIFF = LinearElastic(50e3, 0.48)
 MODULUS = plane_modulus(STIFF.young, STIFF.poisson)
-THESIS = Exponential.from_parameters(strength=2.5, opening=0.001)
-TOUGHNESS = THESIS.toughness[0]
+THESIS = Exponential(strength=2.5, opening=0.001)
+TOUGHNESS = THESIS.toughness
 DEFLECTION = 0.01  # of stationary notches
 
 
@@ -166,7 +166,7 @@ def fracture_parameters(ratio: float, parameters: dict[str, float]) -> dict[str,
 
 def law_of(process_zone: float) -> Exponential:
     """The law with this length E' G_c/t² of the process zone."""
-    return Exponential.from_parameters(strength=float(np.sqrt(MODULUS * TOUGHNESS / process_zone)), toughness=TOUGHNESS)
+    return Exponential(strength=float(np.sqrt(MODULUS * TOUGHNESS / process_zone)), toughness=TOUGHNESS)
 
 
 def past_peak() -> Callable[[StepReport], bool]:

@@ -71,7 +71,7 @@ class Setting:
         """Cohesive laws of epidermis, dermis and hypodermis."""
         openings = (2.5 * self.size, 2.5 * self.size, 10 * self.size)
         first, second, third = (
-            Exponential.from_parameters(opening=opening, toughness=toughness)
+            Exponential(opening=opening, toughness=toughness)
             for opening, toughness in zip(openings, TOUGHNESS.values(), strict=True)
         )
         return first, second, third
@@ -231,7 +231,7 @@ def check(cut: Insertion, summary: Summary, history: History) -> None:
     if depth[-1] > 1.0:
         assert abs(force[steady].mean() / TOUGHNESS["dermis"] - 1) < 0.05, "the dermis is cut at another force"
     for layer in cut_through(cut):
-        given = layer.law.toughness[0] * (layer.thickness - notched(cut, layer))
+        given = layer.law.toughness * (layer.thickness - notched(cut, layer))
         spent = history[f"{layer.name}_fracture"][-1]
         assert abs(spent / given - 1) < 0.03, f"{layer.name}: {spent} spent, {given} given"
     assert summary["largest_closure"] < 0.01

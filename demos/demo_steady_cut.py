@@ -52,7 +52,7 @@ MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
 
 HALF, WIDTH, HEIGHT, NOTCH = 1.0, 1.0, 6.5, 0.5
 SILICONE, VISCOSITY = NeoHookean(0.777, 0.45), 2e-4  # MPa, MPa s at 1 mm/s
-BOND = Exponential.from_parameters(strength=0.3, toughness=0.1)  # MPa, N/mm
+BOND = Exponential(strength=0.3, toughness=0.1)  # MPa, N/mm
 STEADY = (2.0, 4.0)  # depths of the tip between which the cut is steady [mm]
 STEP = 0.05  # way of the tool in a step, at most [mm]
 SPEED, ENTRY_TIME = 1.0, 1.0  # of the push [mm/s]; in which the halves of the blade are spread in the notch [s]
@@ -117,7 +117,7 @@ def main(
     logging.basicConfig(level=logging.ERROR, format="%(name)s: %(message)s")
     claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
     begun = time.perf_counter()
-    histories, summary = {}, {"toughness_given": BOND.toughness[0]}
+    histories, summary = {}, {"toughness_given": BOND.toughness}
     for strip in QUICK if quick else FULL:
         twice = strip.dim == 2 or not quick
         runs = [push(strip, depth, out / f"{strip.folder}_to_{depth:g}", twice) for depth in STEADY[-1 - twice :]]
@@ -153,7 +153,7 @@ def push(strip: Strip, depth: float, out: Path, twice: bool) -> tuple[Insertion,
 
 def expected(strip: Strip) -> tuple[float, float]:
     """Force, and area that the front sweeps in the steady stretch, in closed form [N, mm²]."""
-    force = steady_force(BOND.toughness[0], strip.width, strip.stiffness)
+    force = steady_force(BOND.toughness, strip.width, strip.stiffness)
     return force, strip.width * (STEADY[1] - STEADY[0]) * (1 + force / strip.stiffness)
 
 
@@ -183,7 +183,7 @@ def draw(histories: dict[Strip, History], path: Path) -> None:
     for strip, history in histories.items():
         first = slice(0, int(np.argmax(history["depth"])) + 1)
         curves.append(Curve(history["depth"][first], history["force"][first] / strip.width, strip.name))
-        theory[strip.dim] = steady_force(BOND.toughness[0], strip.width, strip.stiffness) / strip.width
+        theory[strip.dim] = steady_force(BOND.toughness, strip.width, strip.stiffness) / strip.width
     curves += [
         Curve(STEADY, [force] * 2, f"closed form, {dim}-D", "k" + "-:"[dim - 2]) for dim, force in theory.items()
     ]
@@ -193,7 +193,7 @@ def draw(histories: dict[Strip, History], path: Path) -> None:
         xlabel="depth of the tip [mm]",
         ylabel="force per width [N/mm]",
         title="A strip is split",
-        references={"$G_c$": BOND.toughness[0]},
+        references={"$G_c$": BOND.toughness},
     )
 
 
@@ -204,8 +204,8 @@ def check(summary: Summary, strips: list[Strip]) -> None:
         for name in ("steady force over closed form", "swept area over closed form"):
             assert abs(summary[f"{strip.name}, {name}"] - 1) < allowed, (strip.name, name)
         for name in ("force times way over swept area", "two insertions"):
-            value = summary.get(f"{strip.name}, {name}", BOND.toughness[0])  # in space only one insertion if quick
-            assert abs(value / BOND.toughness[0] - 1) < 2 * allowed, (strip.name, name)
+            value = summary.get(f"{strip.name}, {name}", BOND.toughness)  # in space only one insertion if quick
+            assert abs(value / BOND.toughness - 1) < 2 * allowed, (strip.name, name)
 
 
 if __name__ == "__main__":

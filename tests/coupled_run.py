@@ -43,7 +43,7 @@ def coupled(comm=MPI.COMM_WORLD):
     b = make_blocks(2, 4, comm)
     T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
     expansion = ThermoElastic(1e-4, 300.0, softening=-1e-3)
-    law = Exponential.from_parameters(toughness=4e-4, opening=0.01, shear_toughness=2e-4, shear_opening=0.02)
+    law = Exponential(toughness=4e-4, opening=0.01, shear_toughness=2e-4, shear_opening=0.02)
     crack = b.crack(law, contact=PenaltyContact(50.0))
     friction = CrackFriction(crack, Coulomb(0.3, stiffness=100.0))
     solid = b.solid(

@@ -64,7 +64,7 @@ def always(t):
     return 1.0
 
 
-SEPARATION = {"t_n": 1.0, "G_I": 0.1, "t_t": 1.0, "G_II": 0.1}
+SEPARATION = {"strength": 1.0, "toughness": 0.1, "shear_strength": 1.0, "shear_toughness": 0.1}
 TRACK = {"times": [0.0, 1.0], "points": [(0.0, 0.0), (0.0, 1.0)]}
 PUSH = {"half_angle": 0.3, "tip_radius": 0.05}
 
@@ -86,7 +86,7 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "Drive": good(speed=1.0, entry_time=1.0, turning_depth=1.0),
     "DispersedFibres": good(direction=FIBRE, k1=1.0, k2=1.0, dispersion=0.1),
     "EllipsoidalFibres": good(moduli=(1.0, 1.0, 1.0), power=2.0, axes=(FIBRE, (0.0, 1.0, 0.0))),
-    "Exponential": good(t_n=1.0, eps_n=0.1, t_t=1.0, eps_t=0.1),
+    "Exponential": good(strength=1.0, opening=0.1, shear_strength=1.0, shear_opening=0.1),
     "Exponential.from_parameters": good(strength=1.0, opening=0.1, shear_strength=1.0, shear_opening=0.1),
     "ExponentialFibres": good(direction=FIBRE, modulus=1.0, exponential=1.0, power=2.0),
     "Fixture": good(top=("top_left", "top_right"), ends=("far_left", "far_right"), drawn=0.1),
@@ -117,7 +117,7 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "Ogden": good(moduli=(1.0,), exponents=(2.0,), volumetric=1.0),
     "Ogden.from_poisson": good(moduli=(1.0,), exponents=(2.0,), poisson=0.3),
     "PairHeat": good(temperature="@temperature", pair="@pair", law=cutsim.ContactHeat(1.0, 1.0)),
-    "ParkPaulinoRoesler": good(**SEPARATION, alpha=3.0, beta=3.0, peak_n=0.1, peak_t=0.1),
+    "ParkPaulinoRoesler": good(**SEPARATION, alpha=3.0, beta=3.0, peak=0.1, shear_peak=0.1),
     "Path": good(position=lambda t: np.zeros(2), corners=(1.0,)),
     "Path.polyline": good(**TRACK),
     "Path.saw": good(start=(0.0, 0.0), velocity=(0.0, 1.0), stroke=(1.0, 0.0), period=1.0),

@@ -19,7 +19,7 @@ TOUGHNESS = 0.1
 
 def build(comm=MPI.COMM_WORLD, *, friction=0.0, viscosity=0.002, young=0.777, toughness=0.2, **parameters):
     block = {"dim": 2, "Lx": 4.0, "H": 13.0, "lc": 0.05, "band": 0.3, "growth": 1.4, "notch": 0.5} | parameters
-    law = Exponential.from_parameters(strength=0.6, toughness=toughness)
+    law = Exponential(strength=0.6, toughness=toughness)
     blade = Blade(np.radians(12), block["lc"], 0.855)
     domain = read_geo(MESH, comm, block, gdim=2)
     body = cracked_block(domain, NeoHookean(young, 0.45), law, viscosity=viscosity)
@@ -45,7 +45,7 @@ def strip(size, dim=2, until=3.6, friction=0.0, turn=None):
     sizes |= {"B": WIDTH, "sym": 1, "nz": 1} if dim == 3 else {}
     forward, lateral = (0.0, -1.0, 0.0)[:dim], (1.0, 0.0, 0.0)[:dim]
     blade = Blade(np.radians(20), max(0.1, size), 0.5, forward, lateral)
-    law = Exponential.from_parameters(strength=0.3, toughness=TOUGHNESS)
+    law = Exponential(strength=0.3, toughness=TOUGHNESS)
     domain, silicone = read_geo(MESH, MPI.COMM_WORLD, sizes, gdim=dim), NeoHookean(0.777, 0.45)
     body = cracked_block(domain, silicone, law, viscosity=2e-4)
     cut = Insertion.build(body, blade, Drive(1.0, 1.0, turn), notch=0.5, friction=friction)
@@ -151,7 +151,7 @@ def test_every_number_of_ranks_gives_the_same_history():
 
 
 def test_separation_of_the_exponential_law_is_its_closed_form():
-    law = Exponential.from_parameters(strength=0.6, toughness=0.8)
+    law = Exponential(strength=0.6, toughness=0.8)
     opening, fraction = separation_curve(law)
     x = opening / law.opening
     np.testing.assert_allclose(fraction, 1 - (1 + x) * np.exp(-x), atol=1e-4)
@@ -169,7 +169,7 @@ def test_a_second_problem_compiles_nothing_whatever_its_parameters(monkeypatch):
 
 
 def test_parameters_are_refused_by_name():
-    law = Exponential.from_parameters(strength=0.6, toughness=0.2)
+    law = Exponential(strength=0.6, toughness=0.2)
     domain = read_geo(MESH, MPI.COMM_WORLD, {"dim": 2, "lc": 0.5}, gdim=2)
     blade = Blade(0.2, 0.05, 0.855)
     body = cracked_block(domain, NeoHookean(0.777, 0.45), law)
@@ -194,7 +194,7 @@ def test_parameters_are_refused_by_name():
 def test_what_does_not_fit_is_refused(block, tool, options, message):
     block = {"dim": 2, "Lx": 2.0, "H": 3.0, "lc": 0.1, "band": 0.3, "growth": 1.4, "notch": 0.5} | block
     tool = Blade(**{"half_angle": 0.2, "tip_radius": 0.1, "half_thickness": 0.3} | tool)
-    law = Exponential.from_parameters(strength=0.6, toughness=TOUGHNESS)
+    law = Exponential(strength=0.6, toughness=TOUGHNESS)
     domain = read_geo(MESH, MPI.COMM_SELF, block, gdim=2)
     with pytest.raises(ValueError, match=message):
         body = cracked_block(domain, NeoHookean(0.8, 0.45), law)
@@ -213,7 +213,7 @@ def cut_in(units):
     block = {"dim": 2, "Lx": 2, "H": 3, "lc": 0.1, "band": 0.3, "growth": 1.4, "notch": 0.5}
     scaled = {name: value * scales.get(name, 1) for name, value in block.items()}
     domain = read_geo(MESH, MPI.COMM_SELF, scaled, gdim=2)
-    law = Exponential.from_parameters(strength=0.6 * stress, toughness=0.2 * stress * length)
+    law = Exponential(strength=0.6 * stress, toughness=0.2 * stress * length)
     body = cracked_block(domain, NeoHookean(0.777 * stress, 0.45), law, viscosity=2e-3 * stress)
     tool, drive = Blade(0.2, 0.1 * length, 0.3 * length), Drive(speed=2.0 * length, turning_depth=0.6 * length)
     cut = Insertion.build(body, tool, drive, notch=0.5 * length)

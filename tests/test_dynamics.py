@@ -350,7 +350,7 @@ def test_friction_brakes_a_sliding_block():
 
 
 def test_blocks_that_tear_apart_pay_the_toughness_with_kinetic_energy():
-    law = Exponential.from_parameters(toughness=0.1, opening=0.05, shear_toughness=0.1, shear_opening=0.05)
+    law = Exponential(toughness=0.1, opening=0.05, shear_toughness=0.1, shear_opening=0.05)
     _, mechanics = impact(law=law, tolerances=Tolerances(rtol=1e-11))
     rows = history(mechanics, 0.6, StepControl.fixed(0.005))
     assert rows["energy_fracture"][-1] == pytest.approx(0.1, rel=1e-3)

@@ -18,7 +18,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.materials.elastic import LinearElastic, NeoHookean
 
 DISSIPATED = ("fracture", "friction", "viscous")
-WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
+WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 # opening at the top: load, unload, press, load again to failure
 OPENING = ([0, 1, 2, 3, 5], [0.0, 0.25, 0.0, -0.1, 1.2])
 
@@ -88,7 +88,7 @@ def test_viscous_dissipation_in_closed_form():
     supports = [Support(b.state, cells, 0, dim=2), Support(b.state, b.face(1, 0.0), 1)]
     supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: rate * t, name="top"))
     # the crack is kept shut by a law that is far too strong to give way
-    law = Exponential.from_parameters(strength=1e5, opening=1.0)
+    law = Exponential(strength=1e5, opening=1.0)
     terms = [b.solid(NeoHookean(E, NU), viscosity=viscosity), b.crack(law)]
     rows = history(Mechanics(b.state, terms, supports), 1.0, StepControl.fixed(0.01))
     assert rows["energy_viscous"][-1] == pytest.approx(viscosity * rate * (1.5**3 - 1) / 3, rel=1e-3)
@@ -122,4 +122,4 @@ def test_scale_keeps_small_energies_from_looking_unbalanced():
     assert EnergyAudit(scale=1.0).advance(1e-6, []).closure == pytest.approx(1e-6)
     b = make_blocks()
     audit = Mechanics(b.state, [b.solid(), b.crack(EXPONENTIAL)]).audit
-    assert audit.scale == pytest.approx(0.5 * EXPONENTIAL.toughness[0]), "the energy that breaks one facet"
+    assert audit.scale == pytest.approx(0.5 * EXPONENTIAL.toughness), "the energy that breaks one facet"

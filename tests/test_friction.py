@@ -190,8 +190,8 @@ def test_augmentation_sticks_within_tolerance():
 @pytest.mark.parametrize("acts_on", ["broken", "contact", "thesis"])
 def test_where_friction_acts(acts_on, caplog):
     """Beside a bond: on its broken fraction, everywhere, or, as the thesis has it, under tension too."""
-    past, slide = 2.0 * EXPONENTIAL.eps_n, 0.1
-    for opening in (-DEPTH, 0.5 * EXPONENTIAL.eps_n):
+    past, slide = 2.0 * EXPONENTIAL.opening, 0.1
+    for opening in (-DEPTH, 0.5 * EXPONENTIAL.opening):
         b = make_blocks()
         crack = b.crack(EXPONENTIAL, contact=PenaltyContact(NORMAL))
         remember(crack, past)

@@ -174,7 +174,7 @@ def block():
 
 def blade_cut(values):
     """Force per width against depth."""
-    law = Exponential.from_parameters(strength=0.4, toughness=values["toughness"])
+    law = Exponential(strength=0.4, toughness=values["toughness"])
     body = cracked_block(block(), NeoHookean(0.777, 0.45), law, viscosity=0.002)
     cut = Insertion.build(body, Blade(0.2, 0.15, 0.855), Drive(1.0, 1.0), notch=0.6, friction=values["friction"])
     rows = []

@@ -28,7 +28,7 @@ from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
 
-WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
+WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 
 
 def pried_and_pressed(comm=MPI.COMM_WORLD, n=6, gdim=2, **options):
@@ -98,7 +98,7 @@ def two_boxes():
     for support in supports:  # a support holds entities; here one node of the lower side of the crack is to be free
         support.dofs = (3 * held + support.component).astype(np.int32)
         support.bc = fem.dirichletbc(support.bc.g, support.dofs, b.state.V.sub(support.component))
-    law = Exponential.from_parameters(strength=4.0, opening=1e-4, shear_strength=4.0, shear_opening=1e-4)
+    law = Exponential(strength=4.0, opening=1e-4, shear_strength=4.0, shear_opening=1e-4)
     solid = b.solid(LinearElastic(5e6, 0.48), volumetric="full")
     crack = b.crack(law, young=5e6, normal="reference")
     supports += b.drive(upper, [0.0, 0.0, lambda t: 4.8e-4 * t], "top")

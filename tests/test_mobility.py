@@ -99,7 +99,7 @@ def test_cracks_and_contacts_hold_what_they_resist(held_by):
 def test_a_load_beyond_the_strength_has_no_equilibrium():
     """A bond of strength 0.1 under a dead load that grows to 0.12: it ends near 0.1, and says why."""
     b = make_blocks()
-    law = Exponential.from_parameters(strength=0.1, toughness=0.01)
+    law = Exponential(strength=0.1, toughness=0.01)
     supports = [*b.drive(b.lower, [0.0, 0.0]), Support(b.state, b.face(1, 1.0), 0)]
     load = Traction(b.state, b.face(1, 1.0), (0.0, 0.12), lambda t: t, name="pull")
     mechanics = Mechanics(b.state, [b.solid(GEL), b.crack(law), load], supports)

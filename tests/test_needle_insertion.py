@@ -24,7 +24,7 @@ def thread(comm=MPI.COMM_WORLD, *, friction=0.0, turn=None, **sizes):
     """A needle on the axis of a body of revolution."""
     domain = read_geo(MESHES / "thread.geo", comm, ROUND | sizes, gdim=2)
     needle = Needle(np.radians(30), 0.15, RADIUS)
-    law = Exponential.from_parameters(strength=1.0, toughness=TOUGHNESS)
+    law = Exponential(strength=1.0, toughness=TOUGHNESS)
     body = cracked_block(domain, NeoHookean(YOUNG, POISSON), law, viscosity=0.002, axisymmetric=True)
     return Insertion.build(body, needle, Drive(1.0, 1.0, turn), notch=0.5, friction=friction)
 
@@ -33,7 +33,7 @@ def planar(comm=MPI.COMM_WORLD, **sizes):
     """A needle that splits a block."""
     domain = read_geo(MESHES / "needle.geo", comm, BLOCK | sizes, gdim=3)
     needle = Needle(np.radians(25), 0.4, 1.0, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
-    law = Exponential.from_parameters(strength=0.3, toughness=0.15)
+    law = Exponential(strength=0.3, toughness=0.15)
     body = cracked_block(domain, NeoHookean(YOUNG, 0.45), law, viscosity=0.002)
     return Insertion.build(body, needle, Drive(1.0, 1.0), notch=1.0)
 
@@ -41,7 +41,7 @@ def planar(comm=MPI.COMM_WORLD, **sizes):
 def split(*, friction=0.0, turn=None):
     """A blade in plane strain."""
     domain = read_geo(MESHES / "block.geo", MPI.COMM_WORLD, SPLIT, gdim=2)
-    law = Exponential.from_parameters(strength=0.6, toughness=0.2)
+    law = Exponential(strength=0.6, toughness=0.2)
     blade = Blade(np.radians(20), 0.1, 0.6)
     body = cracked_block(domain, NeoHookean(YOUNG, 0.45), law, viscosity=5e-4)
     return Insertion.build(body, blade, Drive(1.0, 1.0, turn), notch=0.5, friction=friction)
@@ -260,7 +260,7 @@ def test_every_number_of_ranks_gives_the_same_history(build):
 
 def test_parameters_are_refused_by_name():
     domain = read_geo(MESHES / "thread.geo", MPI.COMM_WORLD, ROUND | {"lc": 0.25}, gdim=2)
-    law, needle, drive = Exponential.from_parameters(strength=0.6, toughness=0.2), Needle(0.5, 0.15, RADIUS), Drive(1.0)
+    law, needle, drive = Exponential(strength=0.6, toughness=0.2), Needle(0.5, 0.15, RADIUS), Drive(1.0)
     body = cracked_block(domain, NeoHookean(YOUNG, POISSON), law, axisymmetric=True)
     for wrong in ({"notch": 0.1}, {"notch": 0.5, "friction": -0.1}):
         with pytest.raises(ValueError, match="{} = {}".format(*list(wrong.items())[-1])):

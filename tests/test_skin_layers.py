@@ -24,8 +24,8 @@ from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock, skin
 from cutsim.tools.pointed import Blade, Needle
 
-HARD, SOFT = (Exponential.from_parameters(strength=t, toughness=G) for t, G in ((0.3, 0.06), (0.1, 0.02)))
-GLUE = Exponential.from_parameters(strength=1e3, opening=1e-4)
+HARD, SOFT = (Exponential(strength=t, toughness=G) for t, G in ((0.3, 0.06), (0.1, 0.02)))
+GLUE = Exponential(strength=1e3, opening=1e-4)
 THICKNESSES = {"top": 0.1, "core": 0.3, "base": 0.6}
 ELASTIC = {"top": (3.0, 0.2), "core": (1.0, 0.4), "base": (1.5, 0.3)}
 WIDTH = 0.5
@@ -154,7 +154,7 @@ def test_the_crack_costs_each_layer_its_own_toughness():
     block, rows, columns = torn(MPI.COMM_WORLD)
     assert [crack.name for crack in block.cracks] == ["crack_top", "crack_core"]
     for layer in block.layers:
-        spent = layer.law.toughness[0] * layer.thickness
+        spent = layer.law.toughness * layer.thickness
         assert columns[f"{layer.name}_fracture"][0] == pytest.approx(spent, rel=5e-3)
     total = sum(columns[f"{layer.name}_fracture"][0] for layer in block.layers)
     assert rows["energy_fracture"][-1] == pytest.approx(total, rel=1e-9)
@@ -176,12 +176,12 @@ def test_one_law_makes_one_crack_and_a_notch_saves_its_toughness():
     block, _, columns = torn(MPI.COMM_SELF, (HARD, HARD, HARD), notch=0.2)
     assert [crack.name for crack in block.cracks] == ["crack"]
     assert "top_fracture" not in columns
-    assert columns["core_fracture"][0] == pytest.approx(0.2 * HARD.toughness[0], rel=5e-3)
+    assert columns["core_fracture"][0] == pytest.approx(0.2 * HARD.toughness, rel=5e-3)
 
 
 def sliced(comm, depth=0.5, toughness=(0.1, 0.04), width=None, friction=0.0):
     """A blade through a stiff layer into a soft one, steps fixed: problem and history."""
-    laws = [Exponential.from_parameters(opening=0.2, toughness=G) for G in toughness]
+    laws = [Exponential(opening=0.2, toughness=G) for G in toughness]
     layers = [
         Layer("film", 0.3, NeoHookean(1.0, 0.4), laws[0]),
         Layer("base", 0.7, NeoHookean(0.3, 0.4), laws[1]),

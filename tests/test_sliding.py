@@ -430,8 +430,8 @@ def test_rotation_of_a_stuck_interface(gdim, fixed):
 
 def envelope(opening, sliding):
     """Normal and shear traction of the exponential law under growing openings (van den Bosch et al.)."""
-    x, y = opening / EXPONENTIAL.eps_n, sliding / EXPONENTIAL.eps_t
-    normal, shear = (phi / eps for phi, eps in zip(EXPONENTIAL.toughness, (0.1, 0.2), strict=True))
+    x, y = opening / EXPONENTIAL.opening, sliding / EXPONENTIAL.shear_opening
+    normal, shear = EXPONENTIAL.toughness / 0.1, EXPONENTIAL.shear_toughness / 0.2
     return normal * x * np.exp(-x - y**2), 2 * shear * y * (1 + x) * np.exp(-x - y**2)
 
 

@@ -22,7 +22,7 @@ from cutsim.results.recording import Recording
 from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
 
-WEAK = Exponential.from_parameters(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
+WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 
 
 def everything(comm=MPI.COMM_WORLD):

@@ -24,7 +24,7 @@ from cutsim.tools.shapes import Ball, Path, Plane
 from cutsim.tools.tool_contact import ToolContact, doubt_units
 
 # resolved by facets of 1/8: 0.4 ε is larger
-TOUGH = Exponential.from_parameters(toughness=0.5, opening=0.35, shear_toughness=0.5, shear_opening=0.35)
+TOUGH = Exponential(toughness=0.5, opening=0.35, shear_toughness=0.5, shear_opening=0.35)
 
 
 def moved(b, path, *terms, law=TOUGH, **options):
@@ -105,9 +105,9 @@ def test_an_element_that_is_almost_flat():
     ("law", "young", "words"),
     [
         # megapascals for the bond, pascals for the body, and the other way round
-        (Exponential.from_parameters(strength=0.6, toughness=0.5), 0.777e6, "are both in the same units"),
-        (Exponential.from_parameters(strength=0.6e6, toughness=0.5e6), 0.777, "are both in the same units"),
-        (Exponential.from_parameters(strength=0.6, toughness=0.01), 0.777, "do not resolve the process zone"),
+        (Exponential(strength=0.6, toughness=0.5), 0.777e6, "are both in the same units"),
+        (Exponential(strength=0.6e6, toughness=0.5e6), 0.777, "are both in the same units"),
+        (Exponential(strength=0.6, toughness=0.01), 0.777, "do not resolve the process zone"),
         (TOUGH, E, ""),
     ],
 )

@@ -5,7 +5,7 @@ and slides.  A point remembers the smallest of each so far, K_n and K_t, and car
 follows the envelope wherever it is reached, unloads along the secant to the origin, and loses energy on every path.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import e
 from typing import Protocol, runtime_checkable
 
@@ -35,8 +35,12 @@ class CohesiveLaw(Protocol):
         """Characteristic normal opening ε_n [length]; the mesh has to resolve the zone it implies."""
 
     @property
-    def toughness(self) -> tuple[float, float]:
-        """Works of separation (φ_n, φ_t) in pure opening and pure sliding [force/length]."""
+    def toughness(self) -> float:
+        """Work of separation φ_n in pure opening [force/length]."""
+
+    @property
+    def shear_toughness(self) -> float:
+        """Work of separation φ_t in pure sliding [force/length]."""
 
     def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
         """Secant stiffnesses (k_n, k_t) of the envelope [stress/length], non-increasing in both arguments ≥ 0."""
@@ -84,7 +88,7 @@ def strength_and_opening(
 
 
 @checked
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Exponential:
     """Exponential law of the thesis (4.20), after van den Bosch, Schreurs and Geers.
 
@@ -93,74 +97,65 @@ class Exponential:
     T_n peaks at δ_n = ε_n with t_n, T_t at |δ_t| = ε_t/√2 with t_t.  For φ_n ≠ φ_t the work of a mixed path
     depends on the path (there is no potential).
 
+    In each mode two of strength, opening and toughness are given; without any shear value the shear mode has the
+    strength and the toughness of the opening mode.
+
     Args:
-        t_n: Normal strength [stress].
-        eps_n: Characteristic normal opening ε_n [length].
-        t_t: Tangential strength [stress].
-        eps_t: Characteristic sliding ε_t [length].
+        strength: Normal strength t_n [stress].
+        opening: Characteristic normal opening ε_n [length].
+        shear_strength: Shear strength t_t [stress].
+        shear_opening: Characteristic sliding ε_t [length].
+        toughness: Work of separation φ_n = e t_n ε_n in opening [force/length].
+        shear_toughness: Work of separation φ_t = √(e/2) t_t ε_t in sliding [force/length].
+
+    Raises:
+        ValueError: Values are missing, not positive, or contradict each other.
     """
 
-    t_n: float
-    eps_n: float
-    t_t: float
-    eps_t: float
+    strength: float
+    opening: float
+    shear_strength: float
+    shear_opening: float
 
-    def __post_init__(self) -> None:
-        for name in ("t_n", "eps_n", "t_t", "eps_t"):
-            require_number(name, getattr(self, name), positive)
-
-    @classmethod
-    @checked
-    def from_parameters(
-        cls,
-        *,
+    def __init__(
+        self,
         strength: float | None = None,
         opening: float | None = None,
-        toughness: float | None = None,
         shear_strength: float | None = None,
         shear_opening: float | None = None,
+        *,
+        toughness: float | None = None,
         shear_toughness: float | None = None,
-    ) -> "Exponential":
-        """Make the law from two of strength, opening and toughness in each mode.
-
-        Without any shear value the shear mode has the strength and the toughness of the opening mode.
-
-        Raises:
-            ValueError: Values are missing, not positive, or contradict each other.
-        """
-        t_n, eps_n = strength_and_opening(strength, opening, toughness, e)
+    ) -> None:
+        normal = strength_and_opening(strength, opening, toughness, e)
         if shear_strength is None and shear_opening is None and shear_toughness is None:
-            shear_strength, shear_toughness = t_n, e * t_n * eps_n
-        t_t, eps_t = strength_and_opening(shear_strength, shear_opening, shear_toughness, sqrt(e / 2), "shear_")
-        return cls(t_n, eps_n, t_t, eps_t)
+            shear_strength, shear_toughness = normal[0], e * normal[0] * normal[1]
+        shear = strength_and_opening(shear_strength, shear_opening, shear_toughness, sqrt(e / 2), "shear_")
+        for field, value in zip(fields(self), (*normal, *shear), strict=True):
+            object.__setattr__(self, field.name, value)
 
     @property
-    def strength(self) -> float:
-        """Largest normal traction t_n [stress]."""
-        return self.t_n
+    def toughness(self) -> float:
+        """Work of separation φ_n in opening [force/length]."""
+        return e * self.strength * self.opening
 
     @property
-    def opening(self) -> float:
-        """Characteristic normal opening ε_n [length]."""
-        return self.eps_n
-
-    @property
-    def toughness(self) -> tuple[float, float]:
-        """Works of separation φ_n = e t_n ε_n and φ_t = √(e/2) t_t ε_t [force/length]."""
-        return e * self.t_n * self.eps_n, sqrt(e / 2) * self.t_t * self.eps_t
+    def shear_toughness(self) -> float:
+        """Work of separation φ_t in sliding [force/length]."""
+        return sqrt(e / 2) * self.shear_strength * self.shear_opening
 
     def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
         """Secant stiffnesses of the envelope (thesis 4.20)."""
-        normal = opening / self.eps_n
-        decay = exp(-normal - (sliding / self.eps_t) ** 2)
-        k_n = e * self.t_n / self.eps_n * decay
-        k_t = sqrt(2 * e) * self.t_t / self.eps_t * (1 + normal) * decay
+        normal = opening / self.opening
+        decay = exp(-normal - (sliding / self.shear_opening) ** 2)
+        k_n = e * self.strength / self.opening * decay
+        k_t = sqrt(2 * e) * self.shear_strength / self.shear_opening * (1 + normal) * decay
         return k_n, k_t
 
     def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
         """Loss of strength after the peak of each mode, of a bond with these secants in that mode alone."""
-        normal = -log(larger(k_n * self.eps_n / (e * self.t_n), _BROKEN))
-        sliding = sqrt(-log(larger(k_t * self.eps_t / (sqrt(2 * e) * self.t_t), _BROKEN)) + _REST)
+        normal = -log(larger(k_n * self.opening / (e * self.strength), _BROKEN))
+        sliding = sqrt(-log(larger(k_t * self.shear_opening / (sqrt(2 * e) * self.shear_strength), _BROKEN)) + _REST)
         D_n = 1 - normal * exp(1 - normal)
         D_t = 1 - sqrt(2) * sliding * exp(0.5 - sliding**2)
         return if_less(1.0, normal, D_n, 0.0), if_less(1 / sqrt(2), sliding, D_t, 0.0)
@@ -169,24 +164,13 @@ class Exponential:
 class ByToughness:
     """Base of laws whose parameters are a strength and a toughness in each mode."""
 
-    t_n: float
-    G_I: float
-    G_II: float
-
-    @property
-    def strength(self) -> float:
-        """Largest normal traction t_n [stress]."""
-        return self.t_n
+    strength: float
+    toughness: float
 
     @property
     def opening(self) -> float:
         """Normal opening G_I/(e t_n) of the exponential law with the same strength and toughness [length]."""
-        return self.G_I / (e * self.t_n)
-
-    @property
-    def toughness(self) -> tuple[float, float]:
-        """Works of separation (G_I, G_II) [force/length]."""
-        return self.G_I, self.G_II
+        return self.toughness / (e * self.strength)
 
 
 @checked
@@ -204,10 +188,10 @@ class Bilinear(ByToughness):
 
     Args:
         penalty: Stiffness K of the intact bond, in opening [stress/length].
-        t_n: Normal strength [stress].
-        G_I: Toughness in opening [force/length].
-        t_t: Shear strength [stress].
-        G_II: Toughness in sliding [force/length].
+        strength: Normal strength t_n [stress].
+        toughness: Toughness G_I in opening [force/length].
+        shear_strength: Shear strength t_t [stress].
+        shear_toughness: Toughness G_II in sliding [force/length].
         eta: Exponent η of the Benzeggagh–Kenane criterion [–].
         shear_penalty: Stiffness K_t of the intact bond in sliding [stress/length]; None for that in opening.
 
@@ -216,25 +200,33 @@ class Bilinear(ByToughness):
     """
 
     penalty: float
-    t_n: float
-    G_I: float
-    t_t: float
-    G_II: float
+    strength: float
+    toughness: float
+    shear_strength: float
+    shear_toughness: float
     eta: float = 2.0
     shear_penalty: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("penalty", "t_n", "G_I", "t_t", "G_II", "eta"):
+        for name in ("penalty", "strength", "toughness", "shear_strength", "shear_toughness", "eta"):
             require_number(name, getattr(self, name), positive)
-        opening, sliding = self.t_n**2 / (2 * self.G_I), self.t_t**2 / (2 * self.G_II)
+        opening, sliding = self.strength**2 / (2 * self.toughness), self.shear_strength**2 / (2 * self.shear_toughness)
         least = opening if self.shear_penalty is not None else max(opening, sliding)
         require_number("penalty", self.penalty, above(least, "strength²/(2 toughness)"))
-        require_number("shear_penalty", self.shear_penalty, above(sliding, "t_t²/(2 G_II)").or_none)
+        require_number(
+            "shear_penalty", self.shear_penalty, above(sliding, "shear_strength²/(2 shear_toughness)").or_none
+        )
 
     @classmethod
     @checked
     def proportional(
-        cls, penalty: float, t_n: float, G_I: float, t_t: float, G_II: float, eta: float = 2.0
+        cls,
+        penalty: float,
+        strength: float,
+        toughness: float,
+        shear_strength: float,
+        shear_toughness: float,
+        eta: float = 2.0,
     ) -> "Bilinear":
         """Make the law whose modes rise and soften in proportion, K_t = K (G_I/G_II) (t_t/t_n)² (Turon et al. 2010).
 
@@ -243,46 +235,56 @@ class Bilinear(ByToughness):
 
         Args:
             penalty: Stiffness K of the intact bond, in opening [stress/length].
-            t_n: Normal strength [stress].
-            G_I: Toughness in opening [force/length].
-            t_t: Shear strength [stress].
-            G_II: Toughness in sliding [force/length].
+            strength: Normal strength t_n [stress].
+            toughness: Toughness G_I in opening [force/length].
+            shear_strength: Shear strength t_t [stress].
+            shear_toughness: Toughness G_II in sliding [force/length].
             eta: Exponent η of the Benzeggagh–Kenane criterion [–].
         """
-        for name, value in {"penalty": penalty, "t_n": t_n, "G_I": G_I, "t_t": t_t, "G_II": G_II}.items():
-            require_number(name, value, positive)
-        return cls(penalty, t_n, G_I, t_t, G_II, eta, penalty * G_I / G_II * (t_t / t_n) ** 2)
+        _check_positive(penalty=penalty, strength=strength, toughness=toughness)
+        _check_positive(shear_strength=shear_strength, shear_toughness=shear_toughness)
+        shear_penalty = penalty * toughness / shear_toughness * (shear_strength / strength) ** 2
+        return cls(penalty, strength, toughness, shear_strength, shear_toughness, eta, shear_penalty)
 
     @classmethod
     @checked
-    def rigid(cls, t_n: float, G_I: float, t_t: float, G_II: float, eta: float = 2.0, rise: float = 0.01) -> "Bilinear":
+    def rigid(
+        cls,
+        strength: float,
+        toughness: float,
+        shear_strength: float,
+        shear_toughness: float,
+        eta: float = 2.0,
+        rise: float = 0.01,
+    ) -> "Bilinear":
         """Make the initially rigid, linear law T = t (1 − δ/δ_c): the intact bond is so stiff that it hardly opens.
 
         Args:
-            t_n: Normal strength [stress].
-            G_I: Toughness in opening [force/length].
-            t_t: Shear strength [stress].
-            G_II: Toughness in sliding [force/length].
+            strength: Normal strength t_n [stress].
+            toughness: Toughness G_I in opening [force/length].
+            shear_strength: Shear strength t_t [stress].
+            shear_toughness: Toughness G_II in sliding [force/length].
             eta: Exponent η of the Benzeggagh–Kenane criterion [–].
             rise: Largest part of the final jump that the rise to the peak takes, in either mode, in (0, 1) [–].
         """
-        for name, value in {"t_n": t_n, "G_I": G_I, "t_t": t_t, "G_II": G_II}.items():
-            require_number(name, value, positive)
+        _check_positive(strength=strength, toughness=toughness)
+        _check_positive(shear_strength=shear_strength, shear_toughness=shear_toughness)
         require_number("rise", rise, between(0, 1))
-        return cls(max(t_n**2 / (2 * G_I), t_t**2 / (2 * G_II)) / rise, t_n, G_I, t_t, G_II, eta)
+        least = max(strength**2 / (2 * toughness), shear_strength**2 / (2 * shear_toughness))
+        return cls(least / rise, strength, toughness, shear_strength, shear_toughness, eta)
 
     def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
         """Secant stiffnesses (1 − d) K and (1 − d) K_t of the envelope."""
         # the floor keeps the direction of an unloaded jump defined; it is far below any opening that matters
-        floor = (1e-8 * self.t_n / self.penalty) ** 2
+        floor = (1e-8 * self.strength / self.penalty) ** 2
         # with sliding measured so that both modes are as stiff; work is the same
         stiffer = 1.0 if self.shear_penalty is None else self.shear_penalty / self.penalty
         slid = stiffer * sliding**2 + floor
         square = opening**2 + slid
         jump = sqrt(square)
         mix = (slid / square) ** self.eta
-        onset = sqrt((self.t_n**2 + (self.t_t**2 / stiffer - self.t_n**2) * mix) / self.penalty**2)
-        final = 2 * (self.G_I + (self.G_II - self.G_I) * mix) / (self.penalty * onset)
+        onset = sqrt((self.strength**2 + (self.shear_strength**2 / stiffer - self.strength**2) * mix) / self.penalty**2)
+        final = 2 * (self.toughness + (self.shear_toughness - self.toughness) * mix) / (self.penalty * onset)
         intact = onset * (final - jump) / (jump * (final - onset))
         left = if_less(jump, onset, 1.0, if_less(jump, final, intact, 0.0))
         return self.penalty * left, self._shear_penalty * left
@@ -296,13 +298,18 @@ class Bilinear(ByToughness):
         return self.penalty if self.shear_penalty is None else self.shear_penalty
 
 
+def _check_positive(**values: float) -> None:
+    for name, value in values.items():
+        require_number(name, value, positive)
+
+
 def process_zone_element(law: CohesiveLaw, young: float) -> float:
     """Largest element size that resolves the process zone of a law in a body [length].
 
     0.4 ε in soft solids, whose strength is of the order of Young's modulus (measured on blade cuts); a twentieth of
     Irwin's length E G/t² in stiff ones, where the zone is far longer than the opening.
     """
-    return max(0.4 * law.opening, 0.05 * young * law.toughness[0] / law.strength**2)
+    return max(0.4 * law.opening, 0.05 * young * law.toughness / law.strength**2)
 
 
 def separation_curve(law: CohesiveLaw, points: int = 400) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -318,4 +325,4 @@ def separation_curve(law: CohesiveLaw, points: int = 400) -> tuple[NDArray[np.fl
     openings = 40 * law.opening * np.linspace(0, 1, points) ** 2
     tractions = law.secants(openings, np.zeros(points))[0] * openings
     work = np.concatenate([[0.0], np.cumsum(0.5 * (tractions[1:] + tractions[:-1]) * np.diff(openings))])
-    return openings, work / law.toughness[0]
+    return openings, work / law.toughness

@@ -146,9 +146,7 @@ class Crack(Term):
     @property
     def facet_energy(self) -> float:
         """Energy that breaks a facet of mean size in opening; 0 without a law."""
-        return (
-            self.law.toughness[0] * self.points.mean(self.points.weights.sum(axis=1)) if self.law is not None else 0.0
-        )
+        return self.law.toughness * self.points.mean(self.points.weights.sum(axis=1)) if self.law is not None else 0.0
 
     def surface(self, side: Literal["+", "-"]) -> Surface:
         """One face of the crack, for tool contact."""

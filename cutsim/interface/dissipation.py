@@ -93,7 +93,7 @@ def _loss(law: CohesiveLaw, way: Way, memory: Array, mode: int) -> Array:
     start = _last(lambda s: secant(s) >= memory, len(memory))
     # a long step is cut where nothing is left of the bond: no point of the rule might meet what is before
     end = _last(lambda s: secant(s) > _BROKEN * memory, len(memory))
-    work = _integral(power, start, end, _TOLERANCE * law.toughness[mode])
+    work = _integral(power, start, end, _TOLERANCE * (law.toughness, law.shear_toughness)[mode])
     left = np.where(end < 1.0, 0.0, stored(end, secant(end)))
     return np.maximum(work + stored(start, memory) - left, 0.0)
 

@@ -20,32 +20,32 @@ class ParkPaulinoRoesler(ByToughness):
     work of separation depends on the path only as the potential says; unloading goes along the secant to the origin.
 
     Args:
-        t_n: Normal strength > 0 [stress].
-        G_I: Toughness φ_n in opening > 0 [force/length].
-        t_t: Shear strength > 0 [stress].
-        G_II: Toughness φ_t in sliding > 0 [force/length].
+        strength: Normal strength t_n > 0 [stress].
+        toughness: Toughness φ_n in opening > 0 [force/length].
+        shear_strength: Shear strength t_t > 0 [stress].
+        shear_toughness: Toughness φ_t in sliding > 0 [force/length].
         alpha: Shape α > 1 of softening in opening: 2 is about linear, more is concave, less convex [–].
         beta: Shape β > 1 of softening in sliding [–].
-        peak_n: Opening of the peak over the final one, 0 < λ_n ≤ 1/√(2α − 1) [–].
-        peak_t: Sliding of the peak over the final one, 0 < λ_t ≤ 1/√(2β − 1) [–].
+        peak: Opening of the peak over the final one, 0 < λ_n ≤ 1/√(2α − 1) [–].
+        shear_peak: Sliding of the peak over the final one, 0 < λ_t ≤ 1/√(2β − 1) [–].
 
     Raises:
         ValueError: A number is outside its range.
     """
 
-    t_n: float
-    G_I: float
-    t_t: float
-    G_II: float
+    strength: float
+    toughness: float
+    shear_strength: float
+    shear_toughness: float
     alpha: float = 3.0
     beta: float = 3.0
-    peak_n: float = 0.1
-    peak_t: float = 0.1
+    peak: float = 0.1
+    shear_peak: float = 0.1
 
     def __post_init__(self) -> None:
-        for name in ("t_n", "G_I", "t_t", "G_II"):
+        for name in ("strength", "toughness", "shear_strength", "shear_toughness"):
             require_number(name, getattr(self, name), positive)
-        for name, peak in (("alpha", "peak_n"), ("beta", "peak_t")):
+        for name, peak in (("alpha", "peak"), ("beta", "shear_peak")):
             shape, place = getattr(self, name), getattr(self, peak)
             require_number(name, shape, above(1))
             # beyond this the secant would first rise
@@ -55,26 +55,30 @@ class ParkPaulinoRoesler(ByToughness):
     @property
     def final(self) -> tuple[float, float]:
         """Opening δ_nc and sliding δ_tc at which the bond is broken in each pure mode [length]."""
-        normal = _slope(self.peak_n, self.alpha, self.peak_n) * self.G_I / self.t_n
-        return normal, _slope(self.peak_t, self.beta, self.peak_t) * self.G_II / self.t_t
+        normal = _slope(self.peak, self.alpha, self.peak) * self.toughness / self.strength
+        return normal, _slope(self.shear_peak, self.beta, self.shear_peak) * self.shear_toughness / self.shear_strength
 
     def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
         """Secant stiffnesses of the envelope."""
         normal, tangential = self.final
         x, y = opening / normal, sliding / tangential
-        energy = larger(self.G_I, self.G_II)
-        across = positive_part(energy * _shape(y, self.beta, self.peak_t) - positive_part(self.G_II - self.G_I))
-        along = positive_part(energy * _shape(x, self.alpha, self.peak_n) - positive_part(self.G_I - self.G_II))
-        k_n = _secant(x, self.alpha, self.peak_n) / normal**2 * across
-        k_t = _secant(y, self.beta, self.peak_t) / tangential**2 * along
+        energy = larger(self.toughness, self.shear_toughness)
+        across = positive_part(
+            energy * _shape(y, self.beta, self.shear_peak) - positive_part(self.shear_toughness - self.toughness)
+        )
+        along = positive_part(
+            energy * _shape(x, self.alpha, self.peak) - positive_part(self.toughness - self.shear_toughness)
+        )
+        k_n = _secant(x, self.alpha, self.peak) / normal**2 * across
+        k_t = _secant(y, self.beta, self.shear_peak) / tangential**2 * along
         return k_n, k_t
 
     def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
         """Loss of secant stiffness after the peak of each mode (thesis 4.26, 4.27)."""
         normal, tangential = self.final
         return (
-            positive_part(1 - k_n * self.peak_n * normal / self.t_n),
-            positive_part(1 - k_t * self.peak_t * tangential / self.t_t),
+            positive_part(1 - k_n * self.peak * normal / self.strength),
+            positive_part(1 - k_t * self.shear_peak * tangential / self.shear_strength),
         )
 
 

@@ -123,7 +123,7 @@ class SurfacePair(Term):
     def facet_energy(self) -> float:
         """Energy that breaks a facet of mean size in opening; 0 without a law."""
         points = self.passes[0].points
-        return self.law.toughness[0] * points.mean(points.weights.sum(axis=1)) if self.law is not None else 0.0
+        return self.law.toughness * points.mean(points.weights.sum(axis=1)) if self.law is not None else 0.0
 
     def residual(self, v: Expr) -> ufl.Form:
         """No form: all forces are those of the passes."""

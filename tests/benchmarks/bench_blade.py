@@ -31,7 +31,7 @@ def main() -> None:
     """Print one line."""
     comm, reports = MPI.COMM_WORLD, list[StepReport]()
     with measure(comm) as build:
-        law = Exponential.from_parameters(strength=0.6, toughness=0.2)
+        law = Exponential(strength=0.6, toughness=0.2)
         blade = Blade(np.radians(12), 0.05, 0.855)
         domain = read_geo(MESH, comm, BLOCK, gdim=2)
         body = cracked_block(domain, NeoHookean(0.777, 0.45), law, viscosity=0.002)
