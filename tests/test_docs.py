@@ -139,7 +139,7 @@ def test_law_peaks_and_spends_its_toughness(law):
     assert law.final == pytest.approx(0.4)
     x = np.linspace(0, 1, 2001)[1:]
     traction = law.secants(x * law.final, np.zeros(len(x)))[0] * x * law.final
-    np.testing.assert_allclose(traction, 27 / 4 * law.t * x * (1 - x) ** 2, atol=1e-6)
+    np.testing.assert_allclose(traction, 27 / 4 * law.strength * x * (1 - x) ** 2, atol=1e-6)
     assert max(traction) == pytest.approx(law.strength, rel=1e-5)
     assert np.trapezoid([0, *traction], [0, *x * law.final]) == pytest.approx(law.toughness, rel=1e-4)
 
