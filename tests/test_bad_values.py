@@ -10,12 +10,13 @@ from typing import Any, Union, get_args, get_type_hints
 
 import numpy as np
 import pytest
-from conftest import ELASTIC, EXPONENTIAL, make_blocks
 from dolfinx import jit
 from mpi4py import MPI
 
 import cutsim
 import cutsim.identify
+from helpers.blocks import make_blocks
+from helpers.laws import ELASTIC, EXPONENTIAL
 
 INF = float("inf")
 FIBRE = (1.0, 0.0, 0.0)

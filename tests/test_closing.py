@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import E, history, make_blocks, slopes
 from mpi4py import MPI
-from test_sliding import Assembled, two, wavy
-from test_tangents import assert_slope_two, jump_part, smooth
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, begin
@@ -20,6 +17,12 @@ from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation
+from helpers.blocks import make_blocks
+from helpers.boxes import two
+from helpers.fields import jump_part, smooth, wavy
+from helpers.laws import E
+from helpers.runs import history
+from helpers.tangents import Assembled, assert_slope_two, slopes
 
 MU, NORMAL, TANGENTIAL = 0.3, 50.0, 40.0
 CONTACT, LAW = PenaltyContact(NORMAL), Coulomb(MU, TANGENTIAL)

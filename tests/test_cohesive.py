@@ -5,10 +5,10 @@ from math import e, sqrt
 
 import numpy as np
 import pytest
-from conftest import BILINEAR, EXPONENTIAL, PPR, PROPORTIONAL
 
 from cutsim.interface.cohesive import Bilinear, Exponential, process_zone_element
 from cutsim.interface.dissipation import Way, losses
+from helpers.laws import BILINEAR, EXPONENTIAL, PPR, PROPORTIONAL
 
 LAWS = [EXPONENTIAL, BILINEAR, PROPORTIONAL, PPR]
 

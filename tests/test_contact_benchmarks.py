@@ -6,10 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import history
 from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
-from test_sliding import stack
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
@@ -19,6 +17,8 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import LinearElastic
 from cutsim.pairs.surface_pair import SurfacePair
+from helpers.boxes import stack
+from helpers.runs import history
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from demo_dcb import ISOTROPIC, control

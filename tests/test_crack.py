@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, EXPONENTIAL, NU, PPR, PROPORTIONAL, E, history, make_blocks, remember, rotation
 from dolfinx import fem, la
 
 from cutsim.analysis.mechanics import Mechanics
@@ -18,8 +17,10 @@ from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.materials.elastic import NeoHookean, StVenantKirchhoff
 from cutsim.materials.rubbers import MooneyRivlin
-
-PENALTY = PenaltyContact(500.0)
+from helpers.blocks import PENALTY, drag, make_blocks, remember
+from helpers.fields import rotation
+from helpers.laws import BILINEAR, EXPONENTIAL, NU, PPR, PROPORTIONAL, E
+from helpers.runs import history
 
 
 def exponential(law, sliding, opening):
@@ -90,19 +91,6 @@ LAWS = {
     "proportional": (PROPORTIONAL, bilinear, (0.05, 0.02)),
     "ppr": (PPR, ppr, (PPR.shear_peak * PPR.final[1], PPR.peak * PPR.final[0])),
 }
-
-
-def drag(law, waypoints, steps=150, gdim=2, **options):
-    """Move the upper block through the waypoints of the jump at equal times; history over `steps` steps."""
-    b = make_blocks(gdim)
-    legs = np.arange(len(waypoints))
-    between = [0.0] * (gdim - 2)
-    path = [lambda t: np.interp(t, legs, waypoints[:, 0]), *between, lambda t: np.interp(t, legs, waypoints[:, 1])]
-    supports = b.drive(b.lower, [0.0] * gdim) + b.drive(b.upper, path, "upper")
-    options = {"contact": PENALTY, **options}
-    crack = b.crack(law, **options)
-    mechanics = Mechanics(b.state, [crack], supports)
-    return history(mechanics, legs[-1], StepControl.fixed(legs[-1] / steps)), crack
 
 
 @pytest.mark.parametrize("gdim", [2, 3])
@@ -307,7 +295,7 @@ def test_an_error_beside_a_new_crack_lets_the_process_end():
     """Python drops the crack while the error is under way; its communicator must not block those that come after."""
     program = (
         "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from conftest import make_blocks\n"
+        "from helpers.blocks import make_blocks\n"
         "from mpi4py import MPI\n"
         "b = make_blocks()\n"
         "try:\n    [b.crack(), b.crack(young='x')]\n"

@@ -1,35 +1,22 @@
 """The pages say what the code does: their Python runs, and their examples pass the tests of what they extend."""
 
-import re
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
-import test_crack
-import test_materials
-import test_tangents
-import test_tools
-from conftest import make_blocks
 
 from cutsim.fields.points import Surface
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.materials.elastic import Material
 from cutsim.tools.shapes import Shape
-
-DOCS = Path(__file__).parents[1] / "docs"
-PYTHON = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
-
-
-def run_page(name):
-    """Run the Python of a page as one script and return its names."""
-    blocks = PYTHON.findall((DOCS / f"{name}.md").read_text(encoding="utf-8"))
-    assert blocks, f"{name}.md has no Python"
-    names = {"__name__": "__main__"}
-    exec(compile("\n".join(blocks), f"{name}.md", "exec"), names)
-    return names
+from helpers.blocks import JUMPS, drag, make_blocks, separated
+from helpers.fields import smooth
+from helpers.materials import assert_free_of_energy_and_stress, assert_hooke, assert_objective
+from helpers.pages import DOCS, run_page
+from helpers.tangents import assert_slope_two
+from helpers.tools import FRICTION, touch, values
 
 
 @pytest.fixture(scope="module")
@@ -120,15 +107,15 @@ def test_heat():
 
 def test_material_follows_hooke_and_is_objective(material):
     assert isinstance(material, Material)
-    test_materials.test_reference_is_free_of_energy_and_stress(material)
-    test_materials.test_small_strains_follow_hooke(material)
-    test_materials.test_energy_is_objective(material, 2.0)
+    assert_free_of_energy_and_stress(material)
+    assert_hooke(material)
+    assert_objective(material, 2.0, isotropic=True)
 
 
 @pytest.mark.parametrize("gdim", [2, 3])
 def test_tangent_of_material(material, gdim):
     b = make_blocks(gdim)
-    test_tangents.assert_slope_two(b.solid(material), b.state, test_tangents.smooth(b.state.V, 1, 0.2), 1.0)
+    assert_slope_two(b.solid(material), b.state, smooth(b.state.V, 1, 0.2), 1.0)
 
 
 # -- cohesive law -----------------------------------------------------------------------------------------------------
@@ -148,7 +135,7 @@ def test_law_peaks_and_spends_its_toughness(law):
 def test_law_in_a_crack(law, end):
     """Broken, unloaded half way and reloaded, the finite-element crack has dissipated the toughness."""
     path = np.array([(0, 0), np.multiply(end, 0.5), np.multiply(end, 0.1), end])
-    rows, _ = test_crack.drag(law, path, steps=40)
+    rows, _ = drag(law, path, steps=40)
     assert rows["energy_fracture"][-1] == pytest.approx(law.toughness, rel=1e-3)
     assert rows["crack_broken"][-1] == pytest.approx(1.0)
     assert np.diff(rows["energy_fracture"]).min() > -1e-12
@@ -156,12 +143,12 @@ def test_law_in_a_crack(law, end):
 
 @pytest.mark.parametrize("jump", ["opening", "sliding", "mixed", "softening", "compression"])
 def test_tangent_of_law(law, jump):
-    sliding, opening, _ = test_tangents.JUMPS[jump]
+    sliding, opening, _ = JUMPS[jump]
     scale = law.opening
     b = make_blocks()
     crack = b.crack(law, contact=PenaltyContact(30.0))
-    u = test_tangents.separated(b, sliding * scale, opening * scale, 0.01 * scale)
-    test_tangents.assert_slope_two(crack, b.state, u, scale)
+    u = separated(b, sliding * scale, opening * scale, 0.01 * scale)
+    assert_slope_two(crack, b.state, u, scale)
 
 
 # -- tool -------------------------------------------------------------------------------------------------------------
@@ -176,20 +163,20 @@ def test_distance_of_cone(shape):
     normal = c * round_axis - [0, 0, s]
     core = along[:, None] * (s * round_axis + [0, 0, c]) + [0, 0, r]
     height = np.random.default_rng(1).uniform(0.1, 1.0, 40)
-    distance, gradient = test_tools.values(shape, core + height[:, None] * normal)
+    distance, gradient = values(shape, core + height[:, None] * normal)
     np.testing.assert_allclose(distance, height - r, atol=1e-8)
     np.testing.assert_allclose(gradient, normal, atol=1e-6)
-    below, straight = test_tools.values(shape, [(0.0, 0.0, -0.5)])
+    below, straight = values(shape, [(0.0, 0.0, -0.5)])
     assert below[0] == pytest.approx(0.5)
     np.testing.assert_allclose(straight[0], (0, 0, -1), atol=1e-6)
 
 
-@pytest.mark.parametrize("friction", [None, test_tangents.FRICTION], ids=["smooth", "rough"])
+@pytest.mark.parametrize("friction", [None, FRICTION], ids=["smooth", "rough"])
 def test_tangent_of_cone(shape, friction):
     b = make_blocks(3)
     surface = Surface.exterior(b.state, b.face(2, 1.0))
-    tool = test_tangents.touch(b, shape, (0.4, 0.5, 0.9), [surface], friction)
-    test_tangents.assert_slope_two(tool, b.state, test_tangents.smooth(b.state.V, 4, 0.02), 0.05)
+    tool = touch(b, shape, (0.4, 0.5, 0.9), [surface], friction)
+    assert_slope_two(tool, b.state, smooth(b.state.V, 4, 0.02), 0.05)
 
 
 # -- term, step control ------------------------------------------------------------------------------------------------

@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import ufl
-from conftest import BILINEAR, history, make_blocks, slopes
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from test_tangents import STEPS, Linearised, smooth
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, begin, run
@@ -26,6 +24,11 @@ from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
+from helpers.blocks import make_blocks
+from helpers.fields import smooth
+from helpers.laws import BILINEAR
+from helpers.runs import history
+from helpers.tangents import STEPS, Linearised, slopes
 
 E, RHO, LENGTH, CELLS = 3.0, 2.0, 4.0, 8
 AMPLITUDE = 0.01

@@ -3,19 +3,16 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import EXPONENTIAL, history, make_blocks, rotation, slopes
 from dolfinx import fem, mesh
 from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.optimize import brentq
-from test_sliding import Stack, stack
-from test_tangents import assert_slope_two, jump_part, smooth
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl, begin, run
+from cutsim.analysis.stepping import StepControl, begin
 from cutsim.base.assembly import integrate
-from cutsim.base.compat import cell_partitioner, form
+from cutsim.base.compat import form
 from cutsim.bodies.loads import Pressure, Support, Traction
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
@@ -36,61 +33,14 @@ from cutsim.studies.fracture import JIntegral
 from cutsim.tools.pointed import Needle
 from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
-
-E = 2.0
-QUAD, TRIANGLE = mesh.CellType.quadrilateral, mesh.CellType.triangle
-HALF_TURN = np.pi / 2
-
-
-def rectangle(corners, n, cell=QUAD, comm=MPI.COMM_WORLD):
-    partitioner = cell_partitioner()
-    return mesh.create_rectangle(comm, corners, n, cell, partitioner=partitioner)
-
-
-def quarter_ring(inner, outer, n, cell=QUAD):
-    """Quarter of a ring, the meridian plane of half a spherical shell; positions in (r, z)."""
-    domain = rectangle([(inner, 0), (outer, HALF_TURN)], n, cell)
-    radius, angle = domain.geometry.x[:, 0].copy(), domain.geometry.x[:, 1].copy()
-    domain.geometry.x[:, 0], domain.geometry.x[:, 1] = radius * np.sin(angle), radius * np.cos(angle)
-    domain.geometry.x[np.isclose(angle, 0), 0] = 0.0
-    return domain
-
-
-class Body:
-    """A body in the plane or of revolution."""
-
-    def __init__(self, domain, degree=1, *, axisymmetric=True):
-        self.state = State(fem.functionspace(domain, ("Lagrange", degree, (2,))), axisymmetric=axisymmetric)
-
-    def where(self, condition):
-        return mesh.locate_entities_boundary(self.state.mesh, 1, condition)
-
-    def hold(self, condition, component, value=0.0, name=None):
-        return Support(self.state, self.where(condition), component, value, name=name)
-
-    def at(self, *point):
-        """Displacement of the node at a point, the same on all ranks."""
-        x = self.state.V.tabulate_dof_coordinates()[: len(self.state.increment) // 2, :2]
-        near = np.linalg.norm(x - point, axis=1) < 1e-9
-        values = self.state.u.x.array[: 2 * len(x)].reshape(-1, 2)[near]
-        return next(v for part in self.state.mesh.comm.allgather(values) for v in part)
-
-
-def at(axis, value):
-    return lambda x: np.isclose(x[axis], value)
-
-
-def on_sphere(radius):
-    """Facets whose vertices are on a sphere around the origin."""
-    return lambda x: np.isclose(np.hypot(x[0], x[1]), radius)
-
-
-def final(mechanics, until=1.0, step=0.25):
-    """Columns of the last row."""
-    rows = []
-    run(mechanics, until, StepControl.fixed(step), lambda r: rows.append(r.columns))
-    return {name: value for name, (value, _) in rows[-1].items()}
-
+from helpers.blocks import make_blocks
+from helpers.bodies import COOK, Body, at, cook, inflated, shell_error, shell_pressure
+from helpers.boxes import Stack, stack
+from helpers.fields import jump_part, rotation, smooth
+from helpers.laws import EXPONENTIAL, E
+from helpers.meshes import QUADRILATERAL, TRIANGLE, rectangle
+from helpers.runs import final, history
+from helpers.tangents import assert_slope_two, slopes
 
 # -- bodies of revolution ---------------------------------------------------------------------------------------------
 
@@ -103,7 +53,7 @@ def uniaxial_stress(material, stretch):
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(("cell", "degree"), [(QUAD, 1), (QUAD, 2), (TRIANGLE, 1), (TRIANGLE, 2)])
+@pytest.mark.parametrize(("cell", "degree"), [(QUADRILATERAL, 1), (QUADRILATERAL, 2), (TRIANGLE, 1), (TRIANGLE, 2)])
 def test_patch_of_a_stretched_cylinder(cell, degree):
     """Uniform stretch on an irregular mesh: force on the whole cross-section and lateral stretch are exact."""
     domain = rectangle([(0, 0), (1.5, 2)], (3, 4), cell)
@@ -128,21 +78,6 @@ def test_cylinder_under_pressure():
     assert b.at(inner, 0.5)[0] == pytest.approx(opening, rel=1e-4)
     # σ_z = ν (σ_r + σ_θ) is constant
     assert last["end_force"] == pytest.approx(2 * nu * p * inner**2 * np.pi, rel=1e-4)
-
-
-def inflated(n, degree, volumetric, cell=QUAD, *, pressure, nu=0.4999, inner=1.0, outer=2.0):
-    """Half a spherical shell under inner pressure, which grows from 0 to 1 times a value, on a smooth equator."""
-    b = Body(quarter_ring(inner, outer, n, cell), degree)
-    supports = [b.hold(at(1, 0), 1, name="equator"), b.hold(at(0, 0), 0)]
-    load = Pressure(b.state, b.where(on_sphere(inner)), lambda t: pressure * t)
-    solid = Solid(b.state, IsochoricNeoHookean(E, nu), volumetric=volumetric)
-    return b, Mechanics(b.state, [solid, load], supports)
-
-
-def shell_pressure(stretch, inner=1.0, outer=2.0):
-    """Pressure in an incompressible neo-Hookean shell, from the hoop stretch of its inner surface."""
-    far = (1 + (stretch**3 - 1) * (inner / outer) ** 3) ** (1 / 3)
-    return E / 3 * (2 / far + 0.5 / far**4 - 2 / stretch - 0.5 / stretch**4)
 
 
 @pytest.mark.parametrize("volumetric", ["reduced", "mixed"])
@@ -401,29 +336,14 @@ def test_refuses_what_a_body_of_revolution_has_not(name):
 
 # -- elements that do not lock ----------------------------------------------------------------------------------------
 
-#: Deflection of Cook's membrane over load/E at ν = 0.4999: limit of quadratic elements, which reach it from both sides.
-COOK = 19.43
 # cells a side: as many nodes for both degrees
 FREE = {
-    "Q1 reduced": (QUAD, 1, "reduced", 64),
-    "Q1/P0": (QUAD, 1, "mixed", 64),
+    "Q1 reduced": (QUADRILATERAL, 1, "reduced", 64),
+    "Q1/P0": (QUADRILATERAL, 1, "mixed", 64),
     "P2 reduced": (TRIANGLE, 2, "reduced", 32),
-    "Q2 reduced": (QUAD, 2, "reduced", 32),
-    "Q2/P1": (QUAD, 2, "mixed", 32),
+    "Q2 reduced": (QUADRILATERAL, 2, "reduced", 32),
+    "Q2/P1": (QUADRILATERAL, 2, "mixed", 32),
 }
-
-
-def cook(cell, degree, volumetric, n, comm=MPI.COMM_WORLD):
-    """Deflection of the upper corner of Cook's membrane in plane strain, over load/E, at small load."""
-    domain = rectangle([(0, 0), (1, 1)], (n, n), cell, comm)
-    x = domain.geometry.x
-    s, t = x[:, 0].copy(), x[:, 1].copy()
-    x[:, 0], x[:, 1] = 48 * s, 44 * s + t * (44 - 28 * s)
-    b, load = Body(domain, degree, axisymmetric=False), 1e-3
-    shear = Traction(b.state, b.where(at(0, 48)), (0.0, load / 16), lambda t: t)
-    solid = Solid(b.state, IsochoricNeoHookean(1.0, 0.4999), volumetric=volumetric)
-    final(Mechanics(b.state, [solid, shear], [b.hold(at(0, 0), i) for i in range(2)]), step=1.0)
-    return b.at(48, 60)[1] / load
 
 
 @pytest.mark.parametrize("name", FREE)
@@ -433,16 +353,7 @@ def test_cooks_membrane(name):
 
 def test_plain_elements_lock_in_cooks_membrane():
     """On the mesh on which the others are right within 1 %, plain Q1 is off by far more than 20 %."""
-    assert cook(QUAD, 1, "full", 64) < 0.6 * COOK
-
-
-def shell_error(cell, degree, volumetric, n):
-    """Opening of a thick shell at equator and pole over that of Lamé, minus 1."""
-    p, nu = 1e-4, 0.4999
-    b, m = inflated((n, 2 * n), degree, volumetric, cell, pressure=p)
-    final(m, step=1.0)
-    exact = p / (7 * E) * ((1 - 2 * nu) + 4 * (1 + nu))
-    return np.abs(np.array([b.at(1, 0)[0], b.at(0, 1)[1]]) / exact - 1).max()
+    assert cook(QUADRILATERAL, 1, "full", 64) < 0.6 * COOK
 
 
 @pytest.mark.parametrize("name", FREE)
@@ -452,7 +363,7 @@ def test_inflated_shell(name):
 
 
 def test_plain_elements_lock_in_a_shell():
-    assert shell_error(QUAD, 1, "full", 32) > 0.4
+    assert shell_error(QUADRILATERAL, 1, "full", 32) > 0.4
 
 
 @pytest.mark.mpi
@@ -560,8 +471,8 @@ def test_pressure_of_mixed_elements_in_the_stress():
 
 UNMIXED = {
     "triangles": (TRIANGLE, NeoHookean(E, 0.4), {}),
-    "no function of J": (QUAD, LinearElastic(E, 0.4), {}),
-    "plane stress": (QUAD, NeoHookean(E, 0.4), {"plane": "stress"}),
+    "no function of J": (QUADRILATERAL, LinearElastic(E, 0.4), {}),
+    "plane stress": (QUADRILATERAL, NeoHookean(E, 0.4), {"plane": "stress"}),
 }
 
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import EXPONENTIAL, NU, E, history, make_blocks
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
@@ -16,6 +15,9 @@ from cutsim.fields.state import State
 from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.materials.elastic import LinearElastic, NeoHookean
+from helpers.blocks import make_blocks
+from helpers.laws import EXPONENTIAL, NU, E
+from helpers.runs import history
 
 DISSIPATED = ("fracture", "friction", "viscous")
 WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import EXPONENTIAL, E, history, make_blocks, remember, rotation
 from dolfinx import fem
 from mpi4py import MPI
 
@@ -18,6 +17,10 @@ from cutsim.materials.elastic import LinearElastic
 from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
+from helpers.blocks import make_blocks, remember
+from helpers.fields import rotation
+from helpers.laws import EXPONENTIAL, E
+from helpers.runs import history
 
 MU, NORMAL, TANGENTIAL = 0.3, 50.0, 40.0
 DEPTH = 0.02

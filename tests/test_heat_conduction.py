@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import history, make_blocks, slopes
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
@@ -15,6 +14,9 @@ from cutsim.heat.conduction import HeatBody
 from cutsim.heat.loads import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat.transfer import HeatTransfer
 from cutsim.materials.elastic import NeoHookean
+from helpers.blocks import make_blocks
+from helpers.runs import history
+from helpers.tangents import slopes
 
 RHO, C, K = 2.0, 3.0, 0.5
 BODY = {"density": RHO, "capacity": C, "conductivity": K}

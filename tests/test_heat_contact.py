@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import history, make_blocks
 from dolfinx import fem
 from mpi4py import MPI
 from scipy.linalg import expm
@@ -23,6 +22,8 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
+from helpers.blocks import make_blocks
+from helpers.runs import history
 
 STIFFNESS, DEPTH = 10.0, 0.02
 PRESSURE = STIFFNESS * DEPTH

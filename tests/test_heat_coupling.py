@@ -2,13 +2,9 @@
 
 import numpy as np
 import pytest
-from conftest import NU, E, history, make_blocks
-from coupled_run import coupled
 from dolfinx import fem, mesh
 from mpi4py import MPI
 from scipy.optimize import brentq
-from test_output import written
-from test_tangents import assert_slope_two, smooth
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
@@ -32,6 +28,13 @@ from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.results.output import read_history
 from cutsim.results.recording import Recording
 from cutsim.solvers.convergence import Tolerances
+from helpers.blocks import make_blocks
+from helpers.coupled import coupled
+from helpers.fields import smooth
+from helpers.laws import NU, E
+from helpers.output import written
+from helpers.runs import history
+from helpers.tangents import assert_slope_two
 
 G, LAME = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)
 ALPHA, RISE = 1e-3, 100.0

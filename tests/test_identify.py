@@ -7,9 +7,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 from scipy import optimize, stats
-from test_docs import run_page
-from test_materials import ISOTROPIC, energy, name
-from test_materials_closed_forms import PATHS, incompressible, nominal
 
 from cutsim import IsochoricNeoHookean, LinearElastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from cutsim.base.parameters import numbers, substituted, with_numbers
@@ -31,6 +28,8 @@ from cutsim.identify.indentation import _layer_factor
 from cutsim.identify.response import Response
 from cutsim.materials.fibres import DispersedFibres, Reinforced
 from cutsim.materials.library import material
+from helpers.materials import ISOTROPIC, PATHS, energy, incompressible, name, nominal
+from helpers.pages import run_page
 
 # -- numbers of a law -------------------------------------------------------------------------------------------------
 

@@ -1,57 +1,43 @@
 """Strain energies at homogeneous deformations, evaluated symbolically, and the finite-element body in closed forms."""
 
-import functools
-
 import numpy as np
 import pytest
 import ufl
-from conftest import NU, E, history, make_blocks, rotation
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.assembly import integrate
-from cutsim.base.compat import evaluate, form
-from cutsim.base.compat import expression as compiled
-from cutsim.base.parameters import with_constants
+from cutsim.base.compat import form
 from cutsim.bodies.loads import Support, Traction
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
 from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
-from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
+from cutsim.materials.elastic import LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
 from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
-
-MOONEY = MooneyRivlin(0.3, 0.1, 4.0)
-TWO_CONSTANTS = [kind(E, NU) for kind in (NeoHookean, StVenantKirchhoff, LinearElastic)]
-ISOTROPIC = [
-    *TWO_CONSTANTS,
-    IsochoricNeoHookean(E, NU),
+from helpers.blocks import make_blocks
+from helpers.laws import NU, E
+from helpers.materials import (
+    ANISOTROPIC,
+    AXIS,
+    F0,
+    ISOTROPIC,
+    MATERIALS,
     MOONEY,
-    Yeoh(0.3, -0.05, 0.02, 4.0),
-    ArrudaBoyce(0.4, 8.0, 4.0),
-    Ogden((0.5, 0.3), (1.3, -2.0), 2.0),
-]
-AXIS = (0.6, 0.8, 0.0)
-ANISOTROPIC = [
-    TransverselyIsotropic(AXIS, 1.0, 0.3, 4.0, 0.2, 0.7),
-    FungOrthotropic(0.2, (3.0, 2.0, 1.5), (0.5, 0.4, 0.3), (1.0, 0.8, 0.9), 4.0, (AXIS, (-0.8, 0.6, 0.0))),
-    Reinforced(MOONEY, (ExponentialFibres(AXIS, 0.8, 0.5, 2.5),)),
-    Reinforced(NeoHookean(E, NU), (DispersedFibres(AXIS, 0.8, 0.5, 0.1), DispersedFibres((0.0, 0.6, 0.8), 0.8, 0.5))),
-    Reinforced(NeoHookean(E, NU), (EllipsoidalFibres((0.1, 0.2, 0.3), 2.5),)),
-]
-MATERIALS = [*ISOTROPIC, *ANISOTROPIC]
-
-
-def name(material):
-    """Name of a test case."""
-    fibres = getattr(material, "fibres", ())
-    return type(fibres[0] if fibres else material).__name__
-
+    TWO_CONSTANTS,
+    assert_free_of_energy_and_stress,
+    assert_hooke,
+    assert_objective,
+    cube_between_plates,
+    energy,
+    name,
+    stress,
+)
+from helpers.runs import history
 
 each = pytest.mark.parametrize("material", MATERIALS, ids=name)
-F0 = np.array([[1.2, 0.3, -0.1], [0.05, 0.9, 0.2], [0.1, -0.15, 1.1]])
 
 
 def number(expression):
@@ -61,62 +47,20 @@ def number(expression):
     return np.array([expression((), component=i) for i in np.ndindex(*shape)]).reshape(shape)
 
 
-class Response:
-    """Energy and first Piola–Kirchhoff stress of a material at a homogeneous deformation, compiled once."""
-
-    # one for all: a mesh holds communicators, and MPI has few
-    _mesh = mesh.create_unit_interval(MPI.COMM_SELF, 1)
-
-    def __init__(self, material):
-        self._F = fem.Constant(self._mesh, np.eye(3))
-        F = ufl.variable(self._F)
-        W = sum(with_constants(self._mesh, material).energy(F))
-        P = ufl.diff(W, F)
-        values = ufl.as_vector([W, *(P[i, j] for i in range(3) for j in range(3))])
-        self._values = compiled(values, np.array([[0.5]]), self._mesh)
-
-    def __call__(self, F):
-        self._F.value[:] = F
-        return evaluate(self._values, self._mesh, np.zeros(1, dtype=np.int32))[0]
-
-
-response = functools.cache(Response)
-
-
-def energy(material, F):
-    return response(material)(F)[0]
-
-
-def stress(material, F):
-    """First Piola–Kirchhoff stress."""
-    return response(material)(F)[1:].reshape(3, 3)
-
-
 @each
 def test_reference_is_free_of_energy_and_stress(material):
-    assert energy(material, np.eye(3)) == pytest.approx(0, abs=1e-14)
-    np.testing.assert_allclose(stress(material, np.eye(3)), 0, atol=1e-14)
+    assert_free_of_energy_and_stress(material)
 
 
 @pytest.mark.parametrize("material", ISOTROPIC, ids=name)
 def test_small_strains_follow_hooke(material):
-    """P = 2 G ε + λ tr ε I with the constants that the material reports."""
-    H = 1e-6 * (F0 - np.eye(3))
-    strain = 0.5 * (H + H.T)
-    young, poisson = material.young, material.poisson
-    hooke = young / (1 + poisson) * (strain + poisson / (1 - 2 * poisson) * np.trace(strain) * np.eye(3))
-    np.testing.assert_allclose(stress(material, np.eye(3) + H), hooke, atol=1e-5 * np.abs(hooke).max())
+    assert_hooke(material)
 
 
 @pytest.mark.parametrize("material", [m for m in MATERIALS if not isinstance(m, LinearElastic)], ids=name)
 @pytest.mark.parametrize("angle", [0.3, 2.0])
 def test_energy_is_objective(material, angle):
-    """W(QF) = W(F) and P(QF) = Q P(F); turned before the deformation, an isotropic solid does not notice."""
-    Q, W, P = rotation(3, angle), energy(material, F0), stress(material, F0)
-    assert energy(material, Q @ F0) == pytest.approx(float(W), rel=1e-12)
-    np.testing.assert_allclose(stress(material, Q @ F0), Q @ P, atol=1e-12 * np.abs(P).max())
-    alike = energy(material, F0 @ Q) == pytest.approx(float(W), rel=1e-12)
-    assert alike == (material not in ANISOTROPIC)
+    assert_objective(material, angle, isotropic=material not in ANISOTROPIC)
 
 
 @each
@@ -205,21 +149,6 @@ def test_plane_stress_of_others_is_refused(material):
 
 
 # -- the finite-element body ------------------------------------------------------------------------------------------
-
-
-def cube_between_plates(material, stretch, lateral):
-    """Unit cube stretched along z (and x); its other faces free, or with symmetry only."""
-    domain = mesh.create_unit_cube(MPI.COMM_WORLD, 1, 1, 1, mesh.CellType.hexahedron)
-    state = State(fem.functionspace(domain, ("Lagrange", 1, (3,))))
-
-    def face(axis, at):
-        return mesh.locate_entities_boundary(domain, 2, lambda x: np.isclose(x[axis], at))
-
-    supports = [Support(state, face(i, 0.0), i) for i in range(3)]
-    supports.append(Support(state, face(2, 1.0), 2, lambda t: (stretch - 1) * t, name="top"))
-    if lateral:
-        supports.append(Support(state, face(0, 1.0), 0, lambda t: (stretch - 1) * t, name="side"))
-    return Mechanics(state, [Solid(state, material)], supports)
 
 
 @pytest.mark.parametrize("stretch", [0.6, 1.5, 2.0])

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import NU, E, make_blocks
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from test_materials import AXIS, F0, MOONEY, cube_between_plates, energy, name, response, rotation, stress
-from test_tangents import assert_slope_two, smooth
 
 from cutsim.analysis.stepping import StepControl, run
 from cutsim.base.assembly import integrate
@@ -19,6 +16,23 @@ from cutsim.materials.elastic import IsochoricNeoHookean, NeoHookean
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
 from cutsim.materials.rubbers import ArrudaBoyce, Ogden, Yeoh
 from cutsim.materials.stretches import stretch_power_sums
+from helpers.blocks import make_blocks
+from helpers.fields import rotation, smooth
+from helpers.laws import NU, E
+from helpers.materials import (
+    AXIS,
+    F0,
+    MOONEY,
+    PATHS,
+    cube_between_plates,
+    energy,
+    incompressible,
+    name,
+    nominal,
+    response,
+    stress,
+)
+from helpers.tangents import assert_slope_two
 
 STRETCHES = [0.5, 0.9, 1.0, 1.001, 1.4, 2.5]
 # W'(I₁) of energies in the first invariant, and W'(I₂)
@@ -32,23 +46,6 @@ INVARIANTS = {
     ),
 }
 OGDEN = Ogden((0.5, 0.3, 0.02), (1.3, -2.0, 9.0), 3.0)
-PATHS = {"uniaxial": -0.5, "equibiaxial": -2.0, "pure shear": -1.0}
-
-
-def incompressible(path, stretch):
-    """Principal stretches at constant volume: the driven one, its companion, and the free one last."""
-    power = PATHS[path]
-    return {
-        "uniaxial": (stretch, stretch**power, stretch**power),
-        "equibiaxial": (stretch, stretch, stretch**power),
-        "pure shear": (stretch, 1.0, stretch**power),
-    }[path]
-
-
-def nominal(material, stretches):
-    """Driven nominal stress, the pressure being such that the last face is free."""
-    P = stress(material, np.diag(stretches))
-    return P[0, 0] - P[2, 2] * stretches[2] / stretches[0]
 
 
 @pytest.mark.parametrize("stretch", STRETCHES)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from test_materials import energy, stress
 
 from cutsim.materials.elastic import Material
 from cutsim.materials.library import LIBRARY, material
 from cutsim.materials.rubbers import Ogden
+from helpers.materials import energy, stress
 
 
 @pytest.mark.parametrize("name", LIBRARY)

@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 import ufl
-from conftest import NU, E, history, make_blocks, slopes
 from dolfinx import fem, mesh
 from mpi4py import MPI
 from scipy.integrate import quad, simpson
-from test_materials import AXIS, MOONEY, energy, name, stress
-from test_tangents import assert_slope_two, smooth
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, begin
@@ -24,6 +21,12 @@ from cutsim.materials.fibres import DispersedFibres, ExponentialFibres, Reinforc
 from cutsim.materials.rubbers import Ogden, Yeoh
 from cutsim.materials.viscoelastic import Prony
 from cutsim.results.output import interpolate
+from helpers.blocks import make_blocks
+from helpers.fields import smooth
+from helpers.laws import NU, E
+from helpers.materials import AXIS, MOONEY, energy, name, stress
+from helpers.runs import history
+from helpers.tangents import assert_slope_two, slopes
 
 PRONY = Prony((0.5, 0.8), (0.3, 2.0))
 SVK = StVenantKirchhoff(E, NU)

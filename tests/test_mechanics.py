@@ -6,7 +6,6 @@ import weakref
 import numpy as np
 import pytest
 import ufl
-from conftest import NU, Blocks, E, history, make_blocks
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
@@ -27,6 +26,9 @@ from cutsim.results.recording import Recording
 from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
+from helpers.blocks import Blocks, make_blocks
+from helpers.laws import NU, E
+from helpers.runs import history
 
 WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 

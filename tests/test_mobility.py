@@ -5,10 +5,8 @@ import re
 import basix.ufl
 import numpy as np
 import pytest
-from conftest import EXPONENTIAL, NU, E, make_blocks
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from test_sliding import stack
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, StepError, run
@@ -22,6 +20,9 @@ from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
 from cutsim.materials.elastic import NeoHookean
+from helpers.blocks import make_blocks
+from helpers.boxes import stack
+from helpers.laws import EXPONENTIAL, NU, E
 
 COMM = MPI.COMM_WORLD
 GEL = NeoHookean(E, NU)

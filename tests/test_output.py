@@ -21,14 +21,9 @@ from cutsim.base.units import KINDS, Units
 from cutsim.fields.space import cracked_space
 from cutsim.results.output import FieldWriter, HistoryWriter, read_history, write_summary
 from cutsim.results.progress import Progress
+from helpers.output import written
 
 COLUMNS = {"step": "one", "time": "time", "depth": "length", "force_y": "force"}
-
-
-@pytest.fixture
-def folder(tmp_path):
-    """One folder for all ranks."""
-    return MPI.COMM_WORLD.bcast(tmp_path, root=0)
 
 
 @pytest.fixture
@@ -140,11 +135,6 @@ def test_summary_is_plain_json_and_replaced_whole(folder):
         write_summary(path, {"bad": object()}, MPI.COMM_WORLD)
     assert json.loads(path.read_text()) == read
     assert [entry.name for entry in folder.iterdir()] == ["summary.json"]
-
-
-def written(folder, name):
-    """Raw bytes of the values in a VTX file."""
-    return b"".join(part.read_bytes() for part in (folder / name).glob("data.*"))
 
 
 def count(data, number):

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from conftest import history
 from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
-from test_sliding import LINE_SEARCHES, E, stack, two
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
@@ -22,6 +20,9 @@ from cutsim.heat.transfer import HeatTransfer
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import NeoHookean
+from helpers.boxes import stack, two
+from helpers.laws import E
+from helpers.runs import LINE_SEARCHES, history
 
 STIFFNESS, DEPTH = 1000.0, 0.02
 PRESSURE = STIFFNESS * DEPTH

@@ -20,12 +20,6 @@ from cutsim.results.plots import COLOURS, Curve, plot_curves, plot_energy, plot_
 SHAPES = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """One folder for all ranks."""
-    return MPI.COMM_WORLD.bcast(tmp_path, root=0)
-
-
 def torn(shape, degree):
     """The unit square or cube with its right half moved by 0.25, damage = y at the crack between."""
     kind = mesh.CellType[shape]

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import history
 from dolfinx import fem
 from mpi4py import MPI
 
@@ -23,6 +22,7 @@ from cutsim.studies.fixture import Fixture
 from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock, skin
 from cutsim.tools.pointed import Blade, Needle
+from helpers.runs import history
 
 HARD, SOFT = (Exponential(strength=t, toughness=G) for t, G in ((0.3, 0.06), (0.1, 0.02)))
 GLUE = Exponential(strength=1e3, opening=1e-4)

@@ -5,7 +5,6 @@ import signal
 import numpy as np
 import pytest
 import ufl
-from conftest import EXPONENTIAL, NU, E, history, make_blocks
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
@@ -21,6 +20,9 @@ from cutsim.results.output import read_history
 from cutsim.results.recording import Recording
 from cutsim.tools.shapes import Path, Plane
 from cutsim.tools.tool_contact import ToolContact
+from helpers.blocks import make_blocks
+from helpers.laws import EXPONENTIAL, NU, E
+from helpers.runs import history
 
 WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 

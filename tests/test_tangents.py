@@ -4,92 +4,20 @@ import itertools
 
 import numpy as np
 import pytest
-import ufl
-from conftest import BILINEAR, EXPONENTIAL, NU, PPR, PROPORTIONAL, E, make_blocks, remember, slopes
-from dolfinx import fem, la
-from dolfinx.fem.petsc import assemble_matrix
 
-from cutsim.base.compat import form, geometry_nodes
 from cutsim.fields.points import Surface
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
-from cutsim.interface.friction import Coulomb, SmoothCoulomb
+from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.rubbers import MooneyRivlin
 from cutsim.tools.pointed import Blade, Needle
-from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
-from cutsim.tools.tool_contact import ToolContact
-
-STEPS = np.array([1e-2, 5e-3, 2.5e-3])
-
-
-class Linearised:
-    """Nodal forces of a term and their tangent."""
-
-    def __init__(self, term, state):
-        self.u = state.u
-        residual = term.residual(ufl.TestFunction(state.V))
-        tangent = ufl.derivative(residual, state.u, ufl.TrialFunction(state.V))
-        self._forces, self._tangent = (form(f, entity_maps=term.entity_maps) for f in (residual, tangent))
-
-    def forces(self, u):
-        self.u.x.array[:] = u
-        b = fem.assemble_vector(self._forces)
-        b.scatter_reverse(la.InsertMode.add)
-        return b.array.copy()
-
-    def matrix(self, u):
-        self.u.x.array[:] = u
-        A = assemble_matrix(self._tangent)
-        A.assemble()
-        dense = A[:, :]
-        A.destroy()
-        return dense
-
-    def remainders(self, u, w, steps=STEPS):
-        """|f(u + h w) − f(u) − h K w| / |K w| for each step h."""
-        f, slope = self.forces(u), self.matrix(u) @ w
-        return np.array([np.linalg.norm(self.forces(u + h * w) - f - h * slope) for h in steps]) / np.linalg.norm(slope)
-
-
-def smooth(V, seed, size):
-    """Some smooth field of a given size: forces have no kink in its neighbourhood."""
-    rng = np.random.default_rng(seed)
-    gdim = V.mesh.geometry.dim
-    a, b, c = rng.uniform(-1, 1, (gdim, 3)), rng.uniform(-1, 1, (gdim, 3)), rng.uniform(-1, 1, gdim)
-    w = fem.Function(V)
-    w.interpolate(lambda x: np.array([np.sin(a[i] @ x + c[i]) + 0.5 * np.cos(b[i] @ x) for i in range(gdim)]))
-    return size * w.x.array / np.abs(w.x.array).max()
-
-
-def assert_slope_two(term, state, u, size):
-    """Taylor slope 2 in a direction of a size in which forces change markedly but meet no kink."""
-    problem = Linearised(term, state)
-    w = smooth(state.V, 7, size) + jump_part(state, 8, size)
-    remainders = problem.remainders(u, w)
-    assert remainders[0] > 1e-9, "a linear term: the slope says nothing"
-    assert slopes(STEPS, remainders).min() > 1.95, remainders
-    matrix = problem.matrix(u)
-    asymmetry = np.linalg.norm(matrix - matrix.T) / np.linalg.norm(matrix)
-    assert not term.symmetric or asymmetry < 1e-12
-    return asymmetry
-
-
-def jump_part(state, seed, size):
-    """A smooth field on the upper block only."""
-    w = fem.Function(state.V)
-    field = fem.Function(state.V)
-    field.x.array[:] = smooth(state.V, seed, size)
-    gdim = state.mesh.geometry.dim
-    cells = np.arange(state.mesh.topology.index_map(gdim).size_local, dtype=np.int32)
-    points = state.mesh.geometry.x[geometry_nodes(state.mesh)].mean(axis=1)
-    w.x.array[:] = 0
-    for cell in cells[points[:, gdim - 1] > 0.5]:
-        dofs = state.V.dofmap.cell_dofs(cell)
-        for i in range(gdim):
-            w.x.array[dofs * gdim + i] = field.x.array[dofs * gdim + i]
-    return w.x.array
-
+from cutsim.tools.shapes import Ball, FlatPunch, Plane
+from helpers.blocks import JUMPS, make_blocks, remember, separated
+from helpers.fields import jump_part, smooth
+from helpers.laws import BILINEAR, EXPONENTIAL, NU, PPR, PROPORTIONAL, E
+from helpers.tangents import Linearised, assert_slope_two
+from helpers.tools import FRICTION, touch
 
 # -- bulk -------------------------------------------------------------------------------------------------------------
 
@@ -131,16 +59,6 @@ def test_viscosity():
 
 # -- crack ------------------------------------------------------------------------------------------------------------
 
-# mean jump over the characteristic opening (sliding, opening), and how far it has been open over it
-JUMPS = {
-    "opening": (0.0, 0.8, 0.0),
-    "sliding": (0.9, 0.02, 0.0),
-    "mixed": (0.7, 0.8, 0.0),
-    "softening": (1.5, 1.8, 0.0),
-    "unloading": (0.7, 0.6, 2.0),
-    "compression": (0.8, -0.3, 0.0),
-    "compression of the damaged bond": (0.8, -0.3, 3.0),
-}
 LAWS = {
     "exponential": (EXPONENTIAL, 0.1),
     "bilinear": (BILINEAR, 0.02),
@@ -148,14 +66,6 @@ LAWS = {
     "ppr": (PPR, 0.05),
     "contact only": (None, 0.1),
 }
-
-
-def separated(b, sliding, opening, wobble):
-    """A deformed state whose jump is nearly the same all over the crack."""
-    gdim = b.gdim
-    base = smooth(b.state.V, 4, 0.15)
-    b.move(lambda x: 0 * x, lambda x: np.array([0 * x[0] + sliding, *([0 * x[0]] * (gdim - 2)), 0 * x[0] + opening]))
-    return base + b.state.u.x.array + jump_part(b.state, 5, wobble)
 
 
 # open, a crack without a law carries nothing; closed, its pressure along the reference normal is linear
@@ -244,8 +154,6 @@ def test_friction_on_an_intact_bond(acts_on):
 
 # -- tools ------------------------------------------------------------------------------------------------------------
 
-CONTACT = PenaltyContact(40.0, blend=0.02)
-FRICTION = SmoothCoulomb(0.3, 0.01)
 # all points stick, or all slip: between the two the forces have a kink
 FRICTIONS = {"smooth": None, "regularised": FRICTION, "slip": Coulomb(0.3, 1e3), "stick": Coulomb(50.0, 5.0)}
 # shape, and a reference point from which it dips into the plane y = 1 (z = 1) at different depths along it
@@ -262,16 +170,6 @@ SHAPES = {
     "needle in 3-D": (Needle(0.4, 0.2, 0.5, (0.0, 0.0, -1.0)), (0.4, 0.45, 0.9)),
     "plane in 3-D": (Plane((0.1, 0.1, -1.0)), (0.5, 0.5, 0.97)),
 }
-
-
-def touch(b, shape, place, surfaces, friction):
-    """Contact with a tool that moved a little in the step."""
-    before = np.array(place) + np.eye(len(place))[0] * 0.05
-    path = Path.polyline([0.0, 1.0], [before, place])
-    tool = ToolContact(b.state, shape, path, surfaces, contact=CONTACT, friction=friction)
-    b.state.begin(1.0)
-    tool.begin()
-    return tool
 
 
 @pytest.mark.parametrize("friction", FRICTIONS.values(), ids=FRICTIONS)

@@ -5,16 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import ufl
-from conftest import EXPONENTIAL, make_blocks, slopes
 from dolfinx import fem, mesh
 from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.linalg import eigvalsh
-from test_elements import COOK, QUAD, TRIANGLE, Body, at, cook, final, inflated, rectangle, shell_error, shell_pressure
-from test_sliding import two
-from test_space import CELLS, CRACKS, box, facets_of
-from test_tangents import jump_part, smooth
 
 import cutsim.solvers.preconditioners as preconditioners
 from cutsim.analysis.mechanics import Mechanics
@@ -40,9 +35,15 @@ from cutsim.studies.fracture import JIntegral
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
+from helpers.blocks import make_blocks
+from helpers.bodies import COOK, Body, at, cook, inflated, shell_error, shell_pressure
+from helpers.boxes import two
+from helpers.fields import jump_part, smooth
+from helpers.laws import EXPONENTIAL, E
+from helpers.meshes import CELLS, CRACKS, HEXAHEDRON, QUADRILATERAL, TETRAHEDRON, TRIANGLE, box, facets_of, rectangle
+from helpers.runs import final
+from helpers.tangents import slopes
 
-E = 2.0
-TETRAHEDRON, HEXAHEDRON = mesh.CellType.tetrahedron, mesh.CellType.hexahedron
 #: Poisson's ratio of a body that is incompressible to twelve digits.
 INCOMPRESSIBLE = 0.5 - 1e-12
 
@@ -91,15 +92,15 @@ def test_bodies_have_pressures_of_their_own():
 TOUCH = PenaltyContact(40.0, blend=0.02)
 KINDS = {
     "P2/P1": (TRIANGLE, False),
-    "Q2/Q1": (QUAD, False),
-    "axisymmetric": (QUAD, True),
+    "Q2/Q1": (QUADRILATERAL, False),
+    "axisymmetric": (QUADRILATERAL, True),
     "P2/P1 in 3-D": (TETRAHEDRON, False),
 }
 
 
 def torn_and_pressed(cell, axisymmetric):
     """Two nearly incompressible blocks, a cohesive crack between them and a ball upon them, at some state."""
-    gdim = 2 if cell in (QUAD, TRIANGLE) else 3
+    gdim = 2 if cell in (QUADRILATERAL, TRIANGLE) else 3
     b = make_blocks(gdim, 2, cell=cell)
     state = State(cracked_space(b.state.mesh, ("Lagrange", 2, (gdim,)), b.facets), axisymmetric=axisymmetric)
     solid = Solid(state, MooneyRivlin(0.3, 0.1, 4000.0), volumetric="taylor-hood")
@@ -180,7 +181,7 @@ def test_newton_is_quadratic():
 
 def stretched(cell, *, axisymmetric=False, material=None, stretch=1.5, n=3, volumetric="taylor-hood"):
     """A bar on an irregular mesh, in plane strain, of revolution or in space, with smooth sides and a free one."""
-    gdim = 2 if cell in (QUAD, TRIANGLE) else 3
+    gdim = 2 if cell in (QUADRILATERAL, TRIANGLE) else 3
     domain = box(cell, n=n)
     x = domain.geometry.x
     x[:, gdim - 1] += 0.05 * np.sin(2 * np.pi * x[:, gdim - 1]) * np.cos(2 * x[:, 0])
@@ -195,7 +196,7 @@ def stretched(cell, *, axisymmetric=False, material=None, stretch=1.5, n=3, volu
 
 @pytest.mark.mpi
 @pytest.mark.parametrize(
-    ("cell", "axisymmetric"), [(TETRAHEDRON, False), (HEXAHEDRON, False), (QUAD, True), (TRIANGLE, True)]
+    ("cell", "axisymmetric"), [(TETRAHEDRON, False), (HEXAHEDRON, False), (QUADRILATERAL, True), (TRIANGLE, True)]
 )
 def test_incompressible_bar(cell, axisymmetric):
     """P = G (λ − λ⁻²) on every mesh, and a uniform pressure p = σ_z/3 of the Kirchhoff stress."""
@@ -228,19 +229,19 @@ def test_patch_of_a_compressible_bar(name):
         assert rows[1][column] == pytest.approx(rows[0][column], rel=1e-9)
 
 
-@pytest.mark.parametrize(("cell", "n"), [(QUAD, 8), (TRIANGLE, 32)])
+@pytest.mark.parametrize(("cell", "n"), [(QUADRILATERAL, 8), (TRIANGLE, 32)])
 def test_cooks_membrane(cell, n):
     """Within 1 % where plain Q1 is 40 % off and more."""
     assert cook(cell, 2, "taylor-hood", n) == pytest.approx(COOK, rel=0.01)
 
 
-@pytest.mark.parametrize("cell", [QUAD, TRIANGLE])
+@pytest.mark.parametrize("cell", [QUADRILATERAL, TRIANGLE])
 def test_inflated_shell(cell):
     """Within 0.1 % of Lamé where plain Q1 is 76 % off."""
     assert shell_error(cell, 2, "taylor-hood", 16) < 1e-3
 
 
-@pytest.mark.parametrize("cell", [QUAD, TRIANGLE])
+@pytest.mark.parametrize("cell", [QUADRILATERAL, TRIANGLE])
 def test_inflated_shell_at_large_strain(cell):
     b, m = inflated((4, 16), 2, "taylor-hood", cell, pressure=shell_pressure(1.2), nu=INCOMPRESSIBLE)
     last = final(m)
@@ -285,7 +286,7 @@ def errors(cell, n):
     return [np.sqrt(integrate(form(ufl.inner(d, d) * forces._dx))) for d in differences]
 
 
-@pytest.mark.parametrize("cell", [QUAD, TRIANGLE])
+@pytest.mark.parametrize("cell", [QUADRILATERAL, TRIANGLE])
 def test_rates_of_an_incompressible_body(cell):
     """Third order of the displacement, second of the pressure, in L2."""
     meshes = np.array([8, 16, 32])
@@ -294,7 +295,7 @@ def test_rates_of_an_incompressible_body(cell):
     assert rates[-1, 0] > 2.9 and rates[-1, 1] > 1.9, (rates, measured)
 
 
-@pytest.mark.parametrize("cell", [QUAD, TRIANGLE])
+@pytest.mark.parametrize("cell", [QUADRILATERAL, TRIANGLE])
 def test_inf_sup_constant_does_not_shrink(cell):
     """Smallest eigenvalue of B K⁻¹ Bᵀ against the mass of the pressure in a clamped square, but for the constant."""
     constants = []
@@ -340,7 +341,7 @@ def test_pressure_jumps_across_a_crack():
     np.testing.assert_allclose(values.x.array[b.upper], 0, atol=1e-9)
 
 
-@pytest.mark.parametrize("cell", [QUAD, TRIANGLE])
+@pytest.mark.parametrize("cell", [QUADRILATERAL, TRIANGLE])
 def test_double_cantilever_of_a_rubber(cell):
     """P = 3 E' I δ/(a + χ h)³ of two arms of which one is bent up and the other down, and J of its front.
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from conftest import EXPONENTIAL, NU, E, history, make_blocks
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
@@ -20,6 +19,9 @@ from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.pointed import Blade
 from cutsim.tools.shapes import Ball, Path, Plane
 from cutsim.tools.tool_contact import ToolContact
+from helpers.blocks import make_blocks
+from helpers.laws import EXPONENTIAL, NU, E
+from helpers.runs import history
 
 CONTACT = PenaltyContact(60.0, blend=0.01)
 FRICTION = SmoothCoulomb(0.3, 1e-3)

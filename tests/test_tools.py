@@ -2,30 +2,15 @@
 
 from itertools import pairwise
 
-import basix.ufl
 import numpy as np
 import pytest
-import ufl
 
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
+from helpers.tools import values
 
 HALF, R, SHANK = 0.4, 0.3, 0.9  # half angle, tip radius, half thickness of the blade
 BLADE = Blade(HALF, R, SHANK)
-
-
-def values(shape, points):
-    """Distances and gradients at points, shape (n, dimension)."""
-    n = len(points[0])
-    cell = {2: "triangle", 3: "tetrahedron"}[n]
-    x = ufl.variable(ufl.SpatialCoordinate(ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(n,)))))
-    distance = shape.distance(x)
-    gradient = ufl.algorithms.expand_derivatives(ufl.diff(distance, x))
-    distance = ufl.algorithms.expand_derivatives(distance)
-    return (
-        np.array([distance(tuple(p)) for p in points]),
-        np.array([[gradient(tuple(p), component=(i,)) for i in range(n)] for p in points]),
-    )
 
 
 def dense(corners, n=4000):

@@ -4,10 +4,8 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
-from conftest import NU, E, history, make_blocks, slopes
 from dolfinx import fem
 from mpi4py import MPI
-from test_sliding import LINE_SEARCHES, STEPS, Assembled, wavy
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, begin
@@ -25,6 +23,11 @@ from cutsim.tools.shapes import Ball, Path
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation
+from helpers.blocks import make_blocks
+from helpers.fields import wavy
+from helpers.laws import NU, E
+from helpers.runs import LINE_SEARCHES, history
+from helpers.tangents import STEPS, Assembled, slopes
 
 R, MU = 0.35, 0.3
 CONTACT, FRICTION = PenaltyContact(60.0), Coulomb(MU)

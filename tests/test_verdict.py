@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import NU, E, make_blocks
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
@@ -22,6 +21,8 @@ from cutsim.results.output import claim_folder, read_history
 from cutsim.results.recording import Recording
 from cutsim.tools.shapes import Ball, Path, Plane
 from cutsim.tools.tool_contact import ToolContact, doubt_units
+from helpers.blocks import make_blocks
+from helpers.laws import NU, E
 
 # resolved by facets of 1/8: 0.4 ε is larger
 TOUGH = Exponential(toughness=0.5, opening=0.35, shear_toughness=0.5, shear_opening=0.35)
