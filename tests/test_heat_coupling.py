@@ -368,6 +368,8 @@ def test_bad_input_is_refused():
         b.solid(thermoelastic=ThermoElastic(1e-3, 300.0))
     with pytest.raises(ValueError, match="plane = 'stress'"):
         b.solid(thermoelastic=ThermoElastic(1e-3, 300.0, softening=-0.1), temperature=T, plane="stress")
+    with pytest.raises(ValueError, match="with the state of the body"):
+        make_blocks().solid(thermoelastic=ThermoElastic(1e-3, 300.0), temperature=T)
     mechanics = Mechanics(b.state, [b.solid()])
     heat = HeatTransfer(T, [HeatBody(T, density=1, capacity=1, conductivity=1)])
     with pytest.raises(ValueError, match="iterate = 0"):

@@ -16,16 +16,14 @@ import ufl
 from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
-from cutsim.base.assembly import Array, global_dot, nodal_forces, resultant
+from cutsim.base.assembly import Array, global_dot
 from cutsim.base.checks import require
-from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Body, Term
+from cutsim.bodies.mass import Mass
 from cutsim.bodies.schemes import Scheme
 from cutsim.fields.state import State
-from cutsim.solvers.tangent import Tangent
 
 Velocity = Callable[[NDArray[np.float64]], NDArray[np.float64]] | Sequence[float]
 
@@ -50,6 +48,7 @@ class Inertia(Term):
             hexahedra; on simplices of degree 2 some nodes would have no mass).
 
     Attributes:
+        mass: The mass of the bodies.
         velocity: Trial velocity [length/time].
         acceleration: Trial acceleration [length/time²].
 
@@ -67,18 +66,9 @@ class Inertia(Term):
         mass: Literal["consistent", "lumped"] = "consistent",
     ) -> None:
         require("terms", [s.name for s in solids], len(solids) > 0, "with a Solid in a dynamic analysis")
-        for solid in solids:
-            require(f"density of {solid.name}", solid.density, solid.density is not None, "> 0 in a dynamic analysis")
         require("scheme", scheme, isinstance(scheme, Scheme), "a scheme such as Newmark() or GeneralisedAlpha(0.8)")
-        # a node on the axis would have no mass
-        whole = mass == "consistent" or not state.axisymmetric
-        require("mass", mass, whole, "'consistent' in an axisymmetric problem")
         self.state, self.scheme = state, scheme
-        rule = _quadrature(state.V.ufl_element(), mass)
-        self._bodies = [
-            (fem.Constant(state.mesh, default_scalar_type(s.density)), state.measures.cells(s.cells)(metadata=rule))
-            for s in solids
-        ]
+        self.mass = Mass(state, solids, mass)
         self.velocity = fem.Function(state.V, name="velocity")
         self.acceleration = fem.Function(state.V, name="acceleration")
         self._velocity = state.memory.array("velocity", self.velocity)
@@ -87,8 +77,6 @@ class Inertia(Term):
         self._predicted = fem.Function(state.V)
         # c/(β Δt²); zero until the first step begins
         self._weight = fem.Constant(state.mesh, default_scalar_type(0.0))
-        self._field = fem.Function(state.V)
-        self._momentum_form = form(self._mass(self._field, ufl.TestFunction(state.V)))
         self._books = state.memory.value("inertia", _Books(np.zeros(len(state.increment))))
 
     # -- start ----------------------------------------------------------------------------------------------------
@@ -138,32 +126,14 @@ class Inertia(Term):
         """
         a = self.acceleration.x
         a.scatter_forward()
-        known = self._inertia_forces(a.array)
-        a.array[: len(static)] = self._divide_by_mass(np.where(fixed, a.array[: len(static)], -static - known), bcs)
+        known = self.mass.times(a.array)
+        a.array[: len(static)] = self.mass.divide(np.where(fixed, a.array[: len(static)], -static - known), bcs)
         for field, remembered in ((self.velocity, self._velocity), (self.acceleration, self._acceleration)):
             field.x.scatter_forward()
             remembered.commit()
-        self._books.set(_Books(self._inertia_forces(a.array), self._kinetic()))
+        self._books.set(_Books(self.mass.times(a.array), self.mass.kinetic(self.velocity.x.array)))
         self._started.set(True)
         return static + self._books.committed.forces
-
-    def _divide_by_mass(self, forces: Array, bcs: Sequence[fem.DirichletBC]) -> Array:
-        V = self.state.V
-        mass = Tangent(form(self._mass(ufl.TrialFunction(V), ufl.TestFunction(V))), V, symmetric=True)
-        mass.assemble(bcs)
-        x, b = mass.A.createVecs()
-        b.array[:] = forces
-        ksp = PETSc.KSP().create(V.mesh.comm)
-        ksp.setOperators(mass.A)
-        ksp.setType("cg")
-        ksp.getPC().setType("jacobi")  # conditions a mass matrix independently of the mesh
-        ksp.setTolerances(rtol=1e-13)
-        ksp.setErrorIfNotConverged(True)
-        ksp.solve(b, x)
-        solution = x.array_r.copy()
-        for thing in (ksp, mass, x, b):
-            thing.destroy()
-        return solution
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
@@ -174,7 +144,7 @@ class Inertia(Term):
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ c ρ a(u)·v of the inertia forces."""
-        return self._mass(self._weight * (self.state.u - self._predicted), v)
+        return self.mass.form(self._weight * (self.state.u - self._predicted), v)
 
     def begin(self) -> None:
         """Known part of the motion; the displacement starts from that at constant velocity."""
@@ -201,7 +171,7 @@ class Inertia(Term):
         a, v = self.acceleration.x.array, self.velocity.x.array
         a[:] = (self.state.u.x.array - self._predicted.x.array) / (s.beta * dt**2)
         v[:] = self._velocity.committed + dt * ((1 - s.gamma) * self._acceleration.committed + s.gamma * a)
-        forces, kinetic = self._inertia_forces(a), self._kinetic()
+        forces, kinetic = self.mass.times(a), self.mass.kinetic(self.velocity.x.array)
         work = self._dot(0.5 * (forces + old.forces), self.state.increment)
         self._books.trial = _Books(forces, kinetic, old.numerical + work - (kinetic - old.kinetic))
 
@@ -228,9 +198,7 @@ class Inertia(Term):
 
     def momentum(self) -> Array:
         """Linear momentum, one number a component [force·time]. Collective."""
-        return resultant(
-            self.state.mesh.comm, self._inertia_forces(self.velocity.x.array), self.state.mesh.geometry.dim
-        )
+        return self.mass.momentum(self.velocity.x.array)
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Largest nodal speed. Collective."""
@@ -242,29 +210,5 @@ class Inertia(Term):
     def _dt(self) -> float:
         return float(self.state.dt.value)
 
-    def _mass(self, w: Expr, v: Expr) -> ufl.Form:
-        return sum((density * ufl.inner(w, v) * dx for density, dx in self._bodies), start=ufl.Form([]))
-
-    def _inertia_forces(self, field: NDArray[np.float64]) -> Array:
-        """Mass matrix times a field (local entries, ghosts included): owned entries."""
-        self._field.x.array[:] = field
-        return nodal_forces(self._momentum_form)
-
-    def _kinetic(self) -> float:
-        v = self.velocity.x.array
-        return 0.5 * self._dot(v[: len(self.state.increment)], self._inertia_forces(v))
-
     def _dot(self, a: Array, b: Array) -> float:
         return global_dot(self.state.mesh.comm, a, b)
-
-
-def _quadrature(element: ufl.finiteelement.AbstractFiniteElement, mass: str) -> dict[str, int | str]:
-    """Quadrature of the mass: full, or with its points in the nodes."""
-    require("mass", mass, mass in ("consistent", "lumped"), "'consistent' or 'lumped'")
-    degree, cell = element.degree, element.cell_type.name
-    if mass == "consistent":
-        return {"quadrature_degree": 2 * degree}
-    simplex = cell in ("triangle", "tetrahedron")
-    require("mass", mass, degree == 1 or not simplex, f"'consistent' on a {cell} of degree {degree}")
-    # Gauss-Lobatto points of a line are the nodes of degree 2, too
-    return {"quadrature_rule": "vertex" if degree == 1 else "GLL", "quadrature_degree": 2 * degree - 1}
