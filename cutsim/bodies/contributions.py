@@ -1,4 +1,4 @@
-"""What may be added to the elasticity of a body: viscous stresses, relaxation, energy brought by heat."""
+"""Contributions to a body beside its elasticity: viscosity, relaxation, energy brought by heat."""
 
 from collections.abc import Mapping
 
@@ -13,7 +13,7 @@ from cutsim.fields.state import State
 
 
 class Contribution:
-    """Protocol of what is added to a body; every method has a neutral default."""
+    """Base of contributions to a body; every method has a neutral default."""
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work of its stresses."""
@@ -44,7 +44,7 @@ class Contribution:
 
 
 class KelvinVoigt(Contribution):
-    """Viscous stresses S = η dE/dt.
+    """Kelvin–Voigt viscosity with the stress S = η dE/dt.
 
     Args:
         name: Name of the body.
@@ -95,7 +95,7 @@ class KelvinVoigt(Contribution):
 
 
 class Heating(Contribution):
-    """Strain energy that a change of temperature brings into a body which expands with it.
+    """Strain energy that a change of temperature brings into a body that expands with it.
 
     Args:
         name: Name of the body.

@@ -1,4 +1,4 @@
-"""The strain energy of a body as a function of its displacement, under the assumption of plane strain or stress."""
+"""Elasticity of a body: its strain energy as a function of the displacement, in plane strain or stress."""
 
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, Self
@@ -15,7 +15,7 @@ Plane = Literal["strain", "stress"]
 
 
 class Law(Protocol):
-    """What forms need of a material."""
+    """Protocol of a material, as forms use it."""
 
     def energy(self, F: Expr) -> tuple[Expr, Expr]:
         """Strain energy per reference volume, (fully integrated part, volumetric part)."""
@@ -26,7 +26,7 @@ class Law(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Expanding:
-    """A law whose strains are measured from the body that has expanded freely (docs/theory.md §3.4).
+    """Law whose strains are measured from the freely expanded body (docs/theory.md §3.4).
 
     Args:
         law: The law at the reference temperature.
@@ -55,7 +55,7 @@ class Expanding:
 
 @dataclass(frozen=True, eq=False)
 class Elasticity:
-    """Material, kinematics and temperature of a body.
+    """Elasticity of a body: material, kinematics and temperature.
 
     Args:
         state: Displacement and time.

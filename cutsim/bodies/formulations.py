@@ -1,4 +1,4 @@
-"""How the strain energy of a body enters the virtual work: from the displacement alone, or with a pressure.
+"""Formulations of the strain energy in the virtual work: from the displacement alone, or with a pressure.
 
 All formulations have the members of `Formulation`, which is the one of the displacement; the others say what differs
 (docs/elements.md).
@@ -23,7 +23,7 @@ Cells = NDArray[np.int32] | None
 
 
 class Formulation:
-    """The displacement formulation: both parts of the strain energy follow from the displacement.
+    """Displacement formulation: both parts of the strain energy follow from the displacement.
 
     Args:
         elasticity: Strain energy and kinematics.
@@ -75,7 +75,7 @@ class Formulation:
 
 
 class Mixed(Formulation):
-    """Volume change and pressure are projected in each cell: Q1/P0, or Q2 with a discontinuous linear pressure."""
+    """Mixed formulation: volume change and pressure are projected in each cell (Q1/P0, Q2/P1)."""
 
     def __init__(self, elasticity: Elasticity, measures: Measures, cells: Cells) -> None:
         super().__init__(elasticity, measures, cells)
@@ -108,7 +108,7 @@ class Mixed(Formulation):
 
 
 class TaylorHood(Formulation):
-    """A continuous pressure is an unknown beside a displacement of degree 2."""
+    """Taylor–Hood formulation: a continuous pressure is an unknown beside a displacement of degree 2."""
 
     def __init__(self, elasticity: Elasticity, measures: Measures, cells: Cells) -> None:
         super().__init__(elasticity, measures, cells)

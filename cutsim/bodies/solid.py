@@ -1,4 +1,4 @@
-"""A deformable body: hyperelastic bulk, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
+"""Deformable body: hyperelastic, with optional viscosity and thermal expansion (docs/theory.md §2, 3.4)."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal

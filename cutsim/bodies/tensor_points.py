@@ -1,4 +1,4 @@
-"""Symmetric tensors, by their components, at the integration points of cells."""
+"""Symmetric tensors at the integration points of cells, by their components."""
 
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from cutsim.base.memory import Memory
 
 
 class TensorPoints:
-    """Integration points of cells, and which components of a symmetric tensor are not zero there.
+    """Integration points of cells, and the components of a symmetric tensor that are not zero there.
 
     In the plane these are the components in it and the one normal to it.  Arrays of components have the shape
     (cells, points, components).
@@ -73,7 +73,7 @@ class TensorPoints:
 
 
 class TensorField:
-    """A symmetric tensor at the integration points, in forms, and its means over the cells, elsewhere.
+    """Symmetric tensor at the integration points for forms, with its means over the cells for output.
 
     Args:
         name: Name in the memory.

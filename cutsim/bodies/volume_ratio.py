@@ -1,4 +1,4 @@
-"""The smallest volume ratio of a body: how near its elements are to being turned inside out."""
+"""Smallest volume ratio of a body, which tells how near its elements are to inversion."""
 
 from functools import cached_property
 
@@ -14,7 +14,7 @@ from cutsim.bodies.formulations import Cells, Formulation
 
 
 class VolumeRatio:
-    """det F at the integration points of a body.
+    """Volume ratio det F at the integration points of a body.
 
     Args:
         formulation: Of the body.
