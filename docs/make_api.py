@@ -148,7 +148,10 @@ def reference_pages():
     """Write docs/reference/<package>.md, from which Sphinx makes the pages with all docstrings."""
     folder = HERE / "reference"
     folder.mkdir(exist_ok=True)
-    for package in (m.name for m in pkgutil.iter_modules(cutsim.__path__) if m.ispkg):
+    packages = [m.name for m in pkgutil.iter_modules(cutsim.__path__) if m.ispkg]
+    for old in {path for path in folder.glob("*.md") if path.stem not in packages}:
+        old.unlink()
+    for package in packages:
         names = modules(f"cutsim.{package}")
         lines = [f"# cutsim.{package}", "", importlib.import_module(names[0]).__doc__ or "", ""]
         for name in names[1:]:
