@@ -14,10 +14,10 @@ from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
+from cutsim.heat.boundary import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
 from cutsim.heat.interface_heat import InterfaceHeat
-from cutsim.heat.loads import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat.pair_heat import PairHeat
 from cutsim.heat.tool_heat import ToolHeat
 from cutsim.heat.transfer import HeatTransfer
@@ -42,7 +42,7 @@ from cutsim.studies.fixture import Fixture
 from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock
 from cutsim.tools.pointed import Blade, Needle
-from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
+from cutsim.tools.shapes import Ball, FlatPunch, Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.tool_parts import ToolParts
 from cutsim.tools.triangulated_tool import TriangulatedTool
@@ -91,7 +91,6 @@ __all__ = [
     "Ogden",
     "PairHeat",
     "ParkPaulinoRoesler",
-    "Path",
     "PenaltyContact",
     "Plane",
     "PrescribedTemperature",
@@ -116,6 +115,7 @@ __all__ = [
     "ToolContact",
     "ToolHeat",
     "ToolParts",
+    "ToolPath",
     "Traction",
     "TransverselyIsotropic",
     "TriangulatedTool",

@@ -82,8 +82,8 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "Convection": good(temperature="@temperature", facets="@facets", coefficient=1.0, ambient=1.0, corners=(1.0,)),
     "Coulomb": good(mu=0.3, stiffness=1.0, viscosity=1.0, T_ref=1.0, T_damage=2.0),
     "Crack": good(state="@state", facets="@interface", plus="@plus", law=EXPONENTIAL, young=1.0, contact="@contact",
-                  penetration=0.1),
-    "CrackFriction": good(crack="@crack", law=cutsim.Coulomb(0.3), stick=0.1),
+                  allowed_penetration=0.1),
+    "CrackFriction": good(crack="@crack", law=cutsim.Coulomb(0.3), allowed_slip=0.1),
     "Drive": good(speed=1.0, entry_time=1.0, turning_depth=1.0),
     "DispersedFibres": good(direction=FIBRE, k1=1.0, k2=1.0, dispersion=0.1),
     "EllipsoidalFibres": good(moduli=(1.0, 1.0, 1.0), power=2.0, axes=(FIBRE, (0.0, 1.0, 0.0))),
@@ -119,9 +119,9 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "Ogden.from_poisson": good(moduli=(1.0,), exponents=(2.0,), poisson=0.3),
     "PairHeat": good(temperature="@temperature", pair="@pair", law=cutsim.ContactHeat(1.0, 1.0)),
     "ParkPaulinoRoesler": good(**SEPARATION, alpha=3.0, beta=3.0, peak=0.1, shear_peak=0.1),
-    "Path": good(position=lambda t: np.zeros(2), corners=(1.0,)),
-    "Path.polyline": good(**TRACK),
-    "Path.saw": good(start=(0.0, 0.0), velocity=(0.0, 1.0), stroke=(1.0, 0.0), period=1.0),
+    "ToolPath": good(position=lambda t: np.zeros(2), corners=(1.0,)),
+    "ToolPath.polyline": good(**TRACK),
+    "ToolPath.saw": good(start=(0.0, 0.0), velocity=(0.0, 1.0), stroke=(1.0, 0.0), period=1.0),
     "PenaltyContact": good(stiffness=1.0, blend=0.1),
     "PenaltyContact.automatic": good(young=1.0, h=1.0, factor=10.0, blend=0.1),
     "Plane": good(normal=(0.0, 1.0)),
@@ -140,7 +140,7 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "Surface": lambda: {"points": world()["surface"].points},
     "Surface.exterior": good(state="@state", facets="@facets"),
     "SurfacePair": good(state="@state", slave_facets="@slave_facets", master_facets="@master_facets", young=1.0,
-                        contact="@contact", penetration=0.1, stick=0.1, search=0.1),
+                        contact="@contact", allowed_penetration=0.1, allowed_slip=0.1, search=0.1),
     "TaggedMesh": lambda: {f.name: getattr(world()["domain"], f.name) for f in fields(cutsim.TaggedMesh)},
     "Temperature": good(state="@state", space="@space", initial=1.0, absolute_zero=0.0),
     "ThermoElastic": good(expansion=1.0, reference=1.0, softening=1.0),
@@ -186,7 +186,7 @@ ENDLESS = {("run", "until")}
 #: What takes files and curves, beside what is in `cutsim` itself.
 FILES_AND_CURVES = ("StressTest", "fit_material", "fit_simulation", "read_table")
 #: Functions that are called during the run only.
-LATER = {("Path", "position"), ("run", "record"), ("run", "stop"), ("identify.fit_simulation", "simulate")}
+LATER = {("ToolPath", "position"), ("run", "record"), ("run", "stop"), ("identify.fit_simulation", "simulate")}
 #: Handed to dolfinx as they are.
 FREE = {("cracked_space", "element")}
 

@@ -13,7 +13,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import LinearElastic
-from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.shapes import Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation
@@ -65,7 +65,7 @@ def tool(slope, gdim, plate=None):
     """A plate that comes down on a rigid block: a plane, or a surface of segments."""
     b = make_blocks(gdim)
     motion, origin = oblique(slope, gdim - 1), np.array([*[0.5] * (gdim - 1), 1.0])
-    path = Path.polyline([0, 1, 2], [origin + [motion(t, i) for i in range(gdim)] for t in (0, 1, 2)])
+    path = ToolPath.polyline([0, 1, 2], [origin + [motion(t, i) for i in range(gdim)] for t in (0, 1, 2)])
     top, options = b.face(gdim - 1, 1.0), {"contact": CONTACT, "friction": LAW}
     if plate is None:
         term = ToolContact(b.state, Plane(-np.eye(gdim)[-1]), path, [Surface.exterior(b.state, top)], **options)

@@ -169,7 +169,7 @@ def split(ratio):
     bonded = face[compute_midpoints(b.state.mesh, 1, face)[:, 0] > BEAM.crack]
     contact = PenaltyContact.automatic(young, BEAM.size, factor=1.0)
     bond = SurfacePair(
-        b.state, bonded, b.face(1, 1, 0), BEAM.law, young=young, contact=contact, fixed=True, name="bond"
+        b.state, bonded, b.face(1, 1, 0), BEAM.law, young=young, contact=contact, small_sliding=True, name="bond"
     )
     ends = ((1, "upper", 0.5), (0, "lower", -0.5))
     supports = [

@@ -22,7 +22,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.solvers.convergence import Tolerances
-from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.shapes import Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks
 from helpers.fields import smooth
@@ -308,7 +308,7 @@ def block_on_plane(n, height, contact, friction=None):
     domain = mesh.create_unit_square(MPI.COMM_SELF, n, n, mesh.CellType.quadrilateral)
     state = State(fem.functionspace(domain, ("Lagrange", 1, (2,))))
     bottom, top = (mesh.locate_entities_boundary(domain, 1, lambda x, at=at: np.isclose(x[1], at)) for at in (0, 1))
-    path, surface = Path(lambda t: np.array([0.5, height])), Surface.exterior(state, bottom)
+    path, surface = ToolPath(lambda t: np.array([0.5, height])), Surface.exterior(state, bottom)
     shape = Plane((0.0, 1.0))
     return state, top, ToolContact(state, shape, path, [surface], contact=contact, friction=friction, name="plane")
 

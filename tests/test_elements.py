@@ -19,8 +19,8 @@ from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
+from cutsim.heat.boundary import HeatFlux, PrescribedTemperature
 from cutsim.heat.conduction import HeatBody
-from cutsim.heat.loads import HeatFlux, PrescribedTemperature
 from cutsim.heat.transfer import HeatTransfer
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
@@ -31,7 +31,7 @@ from cutsim.materials.viscoelastic import Prony
 from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.fracture import JIntegral
 from cutsim.tools.pointed import Needle
-from cutsim.tools.shapes import Ball, Path
+from cutsim.tools.shapes import Ball, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks
 from helpers.bodies import COOK, Body, at, cook, inflated, shell_error, shell_pressure
@@ -183,7 +183,7 @@ def test_ball_pressed_into_a_cylinder_balances_the_support():
     errors = []
     for step in (0.2, 0.1):
         b = Body(rectangle([(0, 0), (1, 1)], (8, 8)))
-        path = Path.polyline([0, 1], [(0.0, 1.5), (0.0, 1.35)])
+        path = ToolPath.polyline([0, 1], [(0.0, 1.5), (0.0, 1.35)])
         surface = Surface.exterior(b.state, b.where(at(1, 1)))
         contact = PenaltyContact(60.0, 0.05)
         ball = ToolContact(b.state, Ball(0.5), path, [surface], contact=contact, friction=Coulomb(0.3), name="ball")
@@ -204,7 +204,7 @@ def test_needle_through_a_hollow_cylinder(friction):
     """The shaft widens an incompressible cylinder; force = μ × pressure × area, all of it dissipated on the shaft."""
     b, step = Body(rectangle([(1, 0), (3, 1)], (6, 8))), 0.02
     needle = Needle(0.4, 0.3, 1.2)
-    path = Path.polyline([0, 1], [(0.0, 1.0), (0.0, -needle.shaft_height - 0.5)])
+    path = ToolPath.polyline([0, 1], [(0.0, 1.0), (0.0, -needle.shaft_height - 0.5)])
     hole = Surface.exterior(b.state, b.where(at(0, 1)))
     tool = ToolContact(b.state, needle, path, [hole], contact=PenaltyContact(400.0, 0.01), friction=friction)
     index_map = b.state.mesh.topology.index_map(2)

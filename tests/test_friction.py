@@ -15,7 +15,7 @@ from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb, SmoothCoulomb
 from cutsim.materials.elastic import LinearElastic
 from cutsim.solvers.convergence import Tolerances
-from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.shapes import Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks, remember
 from helpers.fields import rotation
@@ -166,7 +166,7 @@ def test_augmentation_sticks_within_tolerance():
     b = make_blocks(2, n=4)
     # the normal stays that of the reference, so that the force along x is friction alone
     crack = b.crack(None, contact=PenaltyContact(NORMAL), normal="reference")
-    friction = CrackFriction(crack, Coulomb(MU), stick=1e-7)
+    friction = CrackFriction(crack, Coulomb(MU), allowed_slip=1e-7)
     top = b.face(1, 1.0)
     supports = b.drive(b.lower, [0.0, 0.0], "base")
     supports += [Support(b.state, top, 1, lambda t: -DEPTH * min(t, 1.0))]
@@ -190,7 +190,7 @@ def test_augmentation_sticks_within_tolerance():
     assert columns["top_x_force"][0] == pytest.approx(MU * normal, rel=1e-6)
 
 
-@pytest.mark.parametrize("acts_on", ["broken", "contact", "thesis"])
+@pytest.mark.parametrize("acts_on", ["broken", "contact", "tension"])
 def test_where_friction_acts(acts_on, caplog):
     """Beside a bond: on its broken fraction, everywhere, or, as the thesis has it, under tension too."""
     past, slide = 2.0 * EXPONENTIAL.opening, 0.1
@@ -206,11 +206,11 @@ def test_where_friction_acts(acts_on, caplog):
         force = friction.slip.points.integral(friction.slip.values("traction")[..., 0] * friction.slip.values("share"))
         k_n, k_t = np.minimum(EXPONENTIAL.secants(past, 0.0), EXPONENTIAL.secants(max(opening, 0.0), slide))
         broken = EXPONENTIAL.damage(k_n, k_t)[1]
-        tension = k_n * max(opening, 0.0) if acts_on == "thesis" else 0.0
+        tension = k_n * max(opening, 0.0) if acts_on == "tension" else 0.0
         limit = MU * (NORMAL * max(-opening, 0.0) + tension)
         expected = limit * (float(broken) if acts_on == "broken" else 1.0)
         assert abs(force) == pytest.approx(expected, rel=1e-6, abs=1e-12)
-    assert ("open faces rub" in caplog.text) == (acts_on == "thesis")
+    assert ("open faces rub" in caplog.text) == (acts_on == "tension")
 
 
 def test_viscous_friction_exceeds_the_limit_by_its_rate():
@@ -245,7 +245,7 @@ def test_friction_falls_with_the_hotter_side(hot):
 def test_tool_slips_at_mu_n():
     """A plate pushed to and fro over a block that does not move: μ N exactly, dissipation μ N s, closed loop."""
     b = make_blocks()
-    path = Path.polyline([0, 1, 2, 4, 5], [(0, 1), (0, 0.98), (0.1, 0.98), (-0.1, 0.98), (0, 0.98)])
+    path = ToolPath.polyline([0, 1, 2, 4, 5], [(0, 1), (0, 0.98), (0.1, 0.98), (-0.1, 0.98), (0, 0.98)])
     top = Surface.exterior(b.state, b.face(1, 1.0))
     plate = ToolContact(b.state, Plane((0.0, -1.0)), path, [top], contact=PenaltyContact(NORMAL), friction=LAW)
     mechanics = Mechanics(b.state, [plate], b.drive(np.union1d(b.lower, b.upper), [0.0, 0.0], "base"))
@@ -261,11 +261,11 @@ def test_tool_slips_at_mu_n():
 # -- state ------------------------------------------------------------------------------------------------------------
 
 
-def elastic_blocks(stick=None, comm=MPI.COMM_WORLD, gdim=2):
+def elastic_blocks(allowed_slip=None, comm=MPI.COMM_WORLD, gdim=2):
     """Two elastic blocks, pressed and dragged over each other: some points stick while others slip."""
     b = make_blocks(gdim, n=4, comm=comm)
     crack = b.crack(None, contact=PenaltyContact(NORMAL))
-    friction = CrackFriction(crack, LAW, stick=stick)
+    friction = CrackFriction(crack, LAW, allowed_slip=allowed_slip)
     bottom, top = b.face(gdim - 1, 0.0), b.face(gdim - 1, 1.0)
     drag = [0.1, *([0.04] * (gdim - 2)), -0.1]
     supports = [Support(b.state, bottom, i) for i in range(gdim)]
@@ -329,4 +329,4 @@ def test_refuses_an_option():
     with pytest.raises(ValueError, match="acts_on = 'all' is not allowed"):
         CrackFriction(crack, LAW, acts_on="all")
     with pytest.raises(ValueError, match=r"stick = 0.0 is not allowed"):
-        CrackFriction(crack, LAW, stick=0.0)
+        CrackFriction(crack, LAW, allowed_slip=0.0)

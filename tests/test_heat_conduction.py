@@ -10,8 +10,8 @@ from cutsim.base.compat import cell_partitioner
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
+from cutsim.heat.boundary import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat.conduction import HeatBody
-from cutsim.heat.loads import Convection, HeatFlux, PrescribedTemperature
 from cutsim.heat.transfer import HeatTransfer
 from cutsim.materials.elastic import NeoHookean
 from helpers.blocks import make_blocks

@@ -12,15 +12,15 @@ from cutsim.analysis.stepping import StepControl
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
 from cutsim.fields.temperature import Temperature
+from cutsim.heat.boundary import PrescribedTemperature
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
 from cutsim.heat.interface_heat import InterfaceHeat
-from cutsim.heat.loads import PrescribedTemperature
 from cutsim.heat.tool_heat import ToolHeat
 from cutsim.heat.transfer import HeatTransfer
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
-from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.shapes import Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks
 from helpers.runs import history
@@ -255,7 +255,7 @@ def under_tool(law, temperature=None, held=300.0, mu=None, speed=0.0):
     """A block held rigidly under a plane that presses it and slides along it."""
     b = make_blocks()
     top = Surface.exterior(b.state, b.face(1, 1.0))
-    path = Path(lambda t: np.array([0.5 + speed * t, 1 - DEPTH]))
+    path = ToolPath(lambda t: np.array([0.5 + speed * t, 1 - DEPTH]))
     friction = None if mu is None else Coulomb(mu, stiffness=1e6)
     tool = ToolContact(b.state, Plane((0.0, -1.0)), path, [top], contact=PenaltyContact(STIFFNESS), friction=friction)
     cells = np.union1d(b.lower, b.upper)
@@ -304,7 +304,7 @@ def test_tool_on_one_face_of_a_crack():
     b = make_blocks()
     T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
     crack = b.crack(None)
-    path = Path(lambda t: np.array([0.5, 0.5 - DEPTH]))
+    path = ToolPath(lambda t: np.array([0.5, 0.5 - DEPTH]))
     tool = ToolContact(b.state, Plane((0.0, -1.0)), path, [crack.surface("+")], contact=PenaltyContact(STIFFNESS))
     mechanics = Mechanics(b.state, [b.solid(), crack, tool], b.drive(b.lower, [0, 0]) + b.drive(b.upper, [0, 1.0]))
     bodies = [

@@ -15,10 +15,10 @@ from cutsim.bodies.solid import Solid
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
+from cutsim.heat.boundary import PrescribedTemperature
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.interface_heat import InterfaceHeat
-from cutsim.heat.loads import PrescribedTemperature
 from cutsim.heat.transfer import HeatTransfer
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
@@ -217,7 +217,7 @@ def rubbing(gdim=2, law=None, coulomb=None, comm=MPI.COMM_WORLD, capacity=2.0, h
     b = make_blocks(gdim, 4, comm)
     T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
     crack = b.crack(None, contact=PenaltyContact(50.0))
-    friction = CrackFriction(crack, coulomb or Coulomb(0.3, stiffness=1e4), temperature=T.value)
+    friction = CrackFriction(crack, coulomb or Coulomb(0.3, stiffness=1e4), temperature=T)
     law = law or ContactHeat(3.0, 1.0)
     times = (0.0, 1.0, 3.0)
     moved = [

@@ -24,7 +24,7 @@ from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.results.recording import Recording
 from cutsim.solvers.convergence import Tolerances
-from cutsim.tools.shapes import Ball, Path
+from cutsim.tools.shapes import Ball, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import Blocks, make_blocks
 from helpers.laws import NU, E
@@ -38,7 +38,7 @@ def pried_and_pressed(comm=MPI.COMM_WORLD, n=6, gdim=2, **options):
     b = make_blocks(gdim, n, comm)
     up = gdim - 1
     start = np.append(np.full(gdim - 1, 0.25), 1.32)
-    path = Path.polyline([0, 1], [start, start - 0.15 * np.eye(gdim)[up] + 0.05 * np.eye(gdim)[0]])
+    path = ToolPath.polyline([0, 1], [start, start - 0.15 * np.eye(gdim)[up] + 0.05 * np.eye(gdim)[0]])
     surface = Surface.exterior(b.state, b.face(up, 1.0))
     contact, friction = PenaltyContact(40.0, 0.02), SmoothCoulomb(0.2, 5e-3)
     ball = ToolContact(b.state, Ball(0.3), path, [surface], contact=contact, friction=friction, name="ball")
@@ -134,7 +134,7 @@ def pressed(penetration, stiffness=20.0):
     supports = [Support(b.state, b.face(1, 0.0), 1)]
     supports.append(Support(b.state, b.face(0, 0.0), 0))
     supports.append(Support(b.state, b.face(1, 1.0), 1, lambda t: np.interp(t, times, values)))
-    crack = b.crack(None, contact=PenaltyContact(stiffness), penetration=penetration)
+    crack = b.crack(None, contact=PenaltyContact(stiffness), allowed_penetration=penetration)
     return Mechanics(b.state, [b.solid(NeoHookean(E, NU)), crack], supports), crack
 
 
@@ -256,7 +256,7 @@ def test_another_direction_of_a_traction_needs_no_other_kernel():
         (lambda b: Traction(b.state, b.face(1, 7.0), (1.0, 0.0), lambda t: t), "facets"),
         (lambda b: b.crack(young=0.0), "young"),
         (lambda b: b.crack(normal="mean"), "normal"),
-        (lambda b: b.crack(penetration=0.0), "penetration"),
+        (lambda b: b.crack(allowed_penetration=0.0), "penetration"),
         (lambda b: b.crack().point_values("nonsense"), "name"),
     ],
 )

@@ -12,9 +12,9 @@ from cutsim.analysis.stepping import StepControl, begin
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.temperature import Temperature
+from cutsim.heat.boundary import PrescribedTemperature
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.contact_heat import ContactHeat
-from cutsim.heat.loads import PrescribedTemperature
 from cutsim.heat.pair_heat import PairHeat
 from cutsim.heat.transfer import HeatTransfer
 from cutsim.interface.contact import PenaltyContact
@@ -69,14 +69,16 @@ class Slabs:
         mu=0.0,
         speed=0.0,
         overhang=0.0,
-        fixed=False,
+        small_sliding=False,
         boxes=None,
         **options,
     ):
         self.b = b = stack(*boxes) if boxes else two(gdim, n, overhang=overhang)
         friction = Coulomb(mu, stiffness=1e8) if mu else None
         contact = PenaltyContact(STIFFNESS)
-        self.pair = b.pair(contact=contact, friction=friction, two_pass=two_pass, search=0.5, fixed=fixed)
+        self.pair = b.pair(
+            contact=contact, friction=friction, two_pass=two_pass, search=0.5, small_sliding=small_sliding
+        )
         path = [lambda t: speed * t, *[0.0] * (gdim - 2), -depth]
         terms = [Solid(b.state, NeoHookean(E, 0.3)), self.pair]
         mechanics = Mechanics(b.state, terms, rigid(b, 0) + rigid(b, 1, path))
@@ -119,7 +121,7 @@ FLUX = (HOT - COLD) / (1 / K["lower"] + 1 / CONDUCTANCE + 1 / K["upper"])  # upw
 @pytest.mark.parametrize(("gdim", "degree"), [(2, 1), (2, 2), (3, 1)])
 def test_steady_slabs_of_nested_meshes(gdim, degree, fixed):
     """Jump and flux with the conductance p γ⁺γ⁻/(γ⁺+γ⁻), exact as long as no slave facet crosses a master edge."""
-    slabs = Slabs(gdim, ends=(HOT, COLD), degree=degree, fixed=fixed)
+    slabs = Slabs(gdim, ends=(HOT, COLD), degree=degree, small_sliding=fixed)
     rows = slabs.run(3e9, 1e9)
     for name, expected in (("flux_plus", -FLUX), ("flux_minus", FLUX)):
         np.testing.assert_allclose(slabs.values(name), expected, rtol=1e-8)

@@ -38,7 +38,7 @@ CASES = {
 def test_tangent(gdim, simplices, degree, case, fixed):
     friction, slid = CASES[case]
     b = two(gdim, overhang=0.5, simplices=simplices, degree=degree, comm=MPI.COMM_SELF)
-    pair = b.pair(friction=friction, fixed=fixed, contact=PenaltyContact(20.0), search=0.5)
+    pair = b.pair(friction=friction, small_sliding=fixed, contact=PenaltyContact(20.0), search=0.5)
     b.state.u_old.x.array[:] = wavy(b.state.V, 1, 0.01)
     pair.begin()
     shift = np.zeros(3)
@@ -66,7 +66,7 @@ JUMPS = {"opening": (0.15, 0.0), "sliding": (0.02, 0.25), "both": (0.08, 0.15), 
 def test_tangent_of_a_bond(gdim, jump, past):
     """A pair with a cohesive law, with friction on what is broken, on its envelope and below it."""
     b = two(gdim, overhang=0.5, comm=MPI.COMM_SELF)
-    pair = b.pair(law=EXPONENTIAL, fixed=True, friction=Coulomb(50.0, 7.0), contact=PenaltyContact(20.0))
+    pair = b.pair(law=EXPONENTIAL, small_sliding=True, friction=Coulomb(50.0, 7.0), contact=PenaltyContact(20.0))
     opening, sliding = JUMPS[jump]
     shift = np.zeros(3)
     shift[0], shift[gdim - 1] = sliding, opening
@@ -155,7 +155,7 @@ def test_augmentation(gdim):
     """A penetration of 1e-4 of the mesh size is met, and the stress is that without any penalty."""
     b = two(gdim, n=(4, 5))
     h = 0.5
-    pair = b.pair(penetration=1e-5 * h, two_pass=True)
+    pair = b.pair(allowed_penetration=1e-5 * h, two_pass=True)
     mechanics = pressed(b, pair)
     begin(mechanics, 1.0)
     assert mechanics.solve("basic").converged
@@ -203,8 +203,8 @@ def test_from_stick_to_slip_without_penetration(gdim, slave):
     options = {
         "friction": Coulomb(mu),
         "contact": PenaltyContact(40 * E / h),
-        "penetration": 1e-4 * h,
-        "stick": 1e-4 * h,
+        "allowed_penetration": 1e-4 * h,
+        "allowed_slip": 1e-4 * h,
     }
     pair = SurfacePair(b.state, faces[slave], faces[1 - slave], young=E, **options)
     rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
@@ -278,7 +278,7 @@ def test_energy_of_a_drawn_block_closes_with_the_steps():
 def test_rotation_of_a_stuck_interface(gdim, fixed):
     """Both bodies turn by 90° in three steps: the forces turn with them, and nothing slips."""
     b = two(gdim, overhang=0.5, comm=MPI.COMM_SELF)
-    pair = b.pair(friction=Coulomb(5.0, 7.0), fixed=fixed, contact=PenaltyContact(20.0), search=0.5)
+    pair = b.pair(friction=Coulomb(5.0, 7.0), small_sliding=fixed, contact=PenaltyContact(20.0), search=0.5)
     problem = Assembled(pair, b.state)
     pair.begin()
     shift = np.zeros(3)
@@ -316,7 +316,7 @@ def envelope(opening, sliding):
 def test_bond_between_meshes_that_do_not_match(gdim, pull):
     """Pulled, sheared, and both, as a whole: force and work of separation of the law, whatever the meshes."""
     b = two(gdim)
-    pair, up = b.pair(law=EXPONENTIAL, fixed=True), gdim - 1
+    pair, up = b.pair(law=EXPONENTIAL, small_sliding=True), gdim - 1
     way = np.append(pull[1] * np.array([[1.0], [0.6, 0.8]][gdim - 2]), pull[0])
     rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
     moved = [
@@ -343,7 +343,7 @@ def test_rollback():
     ends = []
     for disturbed in (False, True):
         b = two(2, overhang=0.5)
-        pair = b.pair(friction=Coulomb(0.3), penetration=1e-3, stick=1e-3, two_pass=True)
+        pair = b.pair(friction=Coulomb(0.3), allowed_penetration=1e-3, allowed_slip=1e-3, two_pass=True)
         path = [lambda t: 0.1 * t, lambda t: -0.02 * min(t, 1)]
         supports = b.drive(0, 0, [0.0, 0.0]) + b.drive(1, 1, path)
         mechanics = Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), pair], supports)
@@ -381,9 +381,9 @@ def memory(mechanics, pair):
 BAD = {
     "young": {"young": 0.0},
     "search": {"search": -1.0},
-    "penetration": {"penetration": 0.0},
-    "stick": {"stick": -1.0},
-    "fixed": {"law": EXPONENTIAL},
+    "allowed_penetration": {"allowed_penetration": 0.0},
+    "allowed_slip": {"allowed_slip": -1.0},
+    "small_sliding": {"law": EXPONENTIAL},
 }
 
 

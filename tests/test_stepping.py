@@ -18,7 +18,7 @@ from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.results.output import read_history
 from cutsim.results.recording import Recording
-from cutsim.tools.shapes import Path, Plane
+from cutsim.tools.shapes import Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks
 from helpers.laws import EXPONENTIAL, NU, E
@@ -30,9 +30,9 @@ WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_openi
 def everything(comm=MPI.COMM_WORLD):
     """A problem with every kind of term: body, viscosity, crack with multipliers, rough tool, load, supports."""
     b = make_blocks(n=4, comm=comm)
-    path = Path.polyline([0, 1], [(0.5, 1.02), (0.6, 0.92)])
+    path = ToolPath.polyline([0, 1], [(0.5, 1.02), (0.6, 0.92)])
     left, right = b.face(0, 0.0), b.face(0, 1.0)
-    crack = b.crack(WEAK, penetration=1e-4, contact=PenaltyContact(20.0))
+    crack = b.crack(WEAK, allowed_penetration=1e-4, contact=PenaltyContact(20.0))
     plate = ToolContact(
         b.state,
         Plane((0.0, -1.0)),
@@ -199,7 +199,7 @@ def test_every_corner_is_met():
     plate = ToolContact(
         b.state,
         Plane((0.0, -1.0)),
-        Path.polyline([0.1 * 3, 0.5], [(0, 2), (0, 3)]),
+        ToolPath.polyline([0.1 * 3, 0.5], [(0, 2), (0, 3)]),
         [Surface.exterior(b.state, b.face(1, 1.0))],
         contact=PenaltyContact(1.0),
     )

@@ -108,7 +108,7 @@ def test_crack_in_three_dimensions(law):
 @pytest.mark.parametrize("opening", [-0.003, -0.05], ids=["within the blend", "beyond the blend"])
 def test_blended_and_augmented_contact(opening):
     b = make_blocks()
-    crack = b.crack(None, contact=PenaltyContact(30.0, blend=0.01), penetration=0.1)
+    crack = b.crack(None, contact=PenaltyContact(30.0, blend=0.01), allowed_penetration=0.1)
     crack.history.multiplier.x.array[:] = 0.15
     assert_slope_two(crack, b.state, separated(b, 0.01, opening, 1e-4), 0.05)
 
@@ -143,12 +143,12 @@ def test_friction_on_a_crack(case, gdim, normal):
         assert case == "stick" or asymmetry > 1e-3
 
 
-@pytest.mark.parametrize("acts_on", ["contact", "thesis"])
+@pytest.mark.parametrize("acts_on", ["contact", "tension"])
 def test_friction_on_an_intact_bond(acts_on):
     b = make_blocks()
     crack = b.crack(EXPONENTIAL, contact=PenaltyContact(30.0))
     term = CrackFriction(crack, Coulomb(0.4, 1e4), acts_on=acts_on)
-    opening = 0.05 if acts_on == "thesis" else -0.03
+    opening = 0.05 if acts_on == "tension" else -0.03
     assert_slope_two(term, b.state, separated(b, 0.07, opening, 1e-3), 0.1)
 
 

@@ -33,7 +33,7 @@ from cutsim.materials.viscoelastic import Prony
 from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.fracture import JIntegral
 from cutsim.tools.pointed import Blade
-from cutsim.tools.shapes import Ball, Path
+from cutsim.tools.shapes import Ball, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks
 from helpers.bodies import COOK, Body, at, cook, inflated, shell_error, shell_pressure
@@ -106,7 +106,7 @@ def torn_and_pressed(cell, axisymmetric):
     solid = Solid(state, MooneyRivlin(0.3, 0.1, 4000.0), volumetric="taylor-hood")
     crack = Crack(state, b.facets, b.lower, EXPONENTIAL, young=E)
     place = np.append(np.full(gdim - 1, 0.4), 1.7)
-    path = Path.polyline([0, 1], [place, place])
+    path = ToolPath.polyline([0, 1], [place, place])
     ball = ToolContact(state, Ball(0.8), path, [Surface.exterior(state, b.face(gdim - 1, 1.0))], contact=TOUCH)
     mechanics = Mechanics(state, [solid, crack, ball])
     begin(mechanics, 1.0)
@@ -399,7 +399,7 @@ def test_ball_pressed_into_rubber():
     forces = []
     for volumetric in ("mixed", "taylor-hood"):
         b = Body(rectangle([(0, 0), (1, 1)], (8, 8)), 2)
-        path = Path.polyline([0, 1], [(0.0, 1.5), (0.0, 1.4)])
+        path = ToolPath.polyline([0, 1], [(0.0, 1.5), (0.0, 1.4)])
         surface = Surface.exterior(b.state, b.where(at(1, 1)))
         contact = PenaltyContact(60.0, 0.05)
         ball = ToolContact(b.state, Ball(0.5), path, [surface], contact=contact, friction=Coulomb(0.3), name="ball")
@@ -426,7 +426,7 @@ def test_blade_between_crack_faces():
             ToolContact(
                 state,
                 replace(blade, side=side),
-                Path.polyline([0, 1], [(-0.25 * side, start), (0.0, start)]),
+                ToolPath.polyline([0, 1], [(-0.25 * side, start), (0.0, start)]),
                 [faces.surface(face)],
                 contact=PenaltyContact(200.0, 0.04),
                 name=name,

@@ -17,7 +17,7 @@ from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.pointed import Blade
-from cutsim.tools.shapes import Ball, Path, Plane
+from cutsim.tools.shapes import Ball, Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks
 from helpers.laws import EXPONENTIAL, NU, E
@@ -33,7 +33,7 @@ def indented(gdim, friction=FRICTION):
     state = State(fem.functionspace(b.state.mesh, ("Lagrange", 1, (gdim,))))
     down, along = np.eye(gdim)[-1], np.eye(gdim)[0]
     start = 0.45 * np.ones(gdim) + (1.35 - 0.45) * down
-    path = Path.polyline([0, 1, 2], [start, start - 0.2 * down, start - 0.2 * down + 0.1 * along])
+    path = ToolPath.polyline([0, 1, 2], [start, start - 0.2 * down, start - 0.2 * down + 0.1 * along])
     top = Surface.exterior(state, b.face(gdim - 1, 1.0))
     ball = ToolContact(state, Ball(0.35), path, [top], contact=CONTACT, friction=friction)
     supports = [Support(state, b.face(gdim - 1, 0.0), i, name=f"base_{'xyz'[i]}") for i in range(gdim)]
@@ -89,7 +89,7 @@ def rigid_block_under_plate(path, friction):
 
 def test_friction_dissipates_mu_p_times_the_slip():
     """A plate 0.02 deep slides 0.5 to and fro: p = ε d, D = μ p A s, never falling; the base carries μ p A."""
-    path = Path.polyline([0, 1, 2, 4], [(0, 1), (0, 0.98), (0.5, 0.98), (-0.5, 0.98)])
+    path = ToolPath.polyline([0, 1, 2, 4], [(0, 1), (0, 0.98), (0.5, 0.98), (-0.5, 0.98)])
     rows = history(rigid_block_under_plate(path, FRICTION), 4.0, StepControl.fixed(0.01))
     pressure = 50 * 0.02
     slid = rows["time"] > 1.011
@@ -106,26 +106,26 @@ def test_friction_dissipates_mu_p_times_the_slip():
 
 
 def test_tool_without_contact_does_nothing():
-    path = Path.polyline([0, 1], [(0, 1.5), (0.5, 1.1)])
+    path = ToolPath.polyline([0, 1], [(0, 1.5), (0.5, 1.1)])
     rows = history(rigid_block_under_plate(path, FRICTION), 1.0, StepControl.fixed(0.5))
     for name in ("tool_force_x", "tool_force_y", "tool_moment_z", "energy_contact", "energy_friction"):
         assert not rows[name].any()
 
 
 def test_corners_of_the_path_are_those_of_the_tool():
-    path = Path.polyline([0, 0.3, 1], [(0, 1.5), (0.5, 1.5), (0, 1.5)])
+    path = ToolPath.polyline([0, 0.3, 1], [(0, 1.5), (0.5, 1.5), (0, 1.5)])
     rows = history(rigid_block_under_plate(path, None), 1.0, StepControl.fixed(0.2))
     assert 0.3 in rows["time"]
 
 
 def test_refuses_what_cannot_touch():
     b = make_blocks()
-    path = Path(lambda t: np.zeros(2))
+    path = ToolPath(lambda t: np.zeros(2))
     surface = Surface.exterior(b.state, b.face(1, 1.0))
     with pytest.raises(ValueError, match="surfaces = 0 is not allowed"):
         ToolContact(b.state, Ball(1.0), path, [], contact=CONTACT)
     with pytest.raises(ValueError, match=r"path\(0\) = .* 2 components"):
-        ToolContact(b.state, Ball(1.0), Path(lambda t: np.zeros(3)), [surface], contact=CONTACT)
+        ToolContact(b.state, Ball(1.0), ToolPath(lambda t: np.zeros(3)), [surface], contact=CONTACT)
     with pytest.raises(ValueError, match=r"shape.push = \(0.0, -1.0, 0.0\) .* of 2 components"):
         flat = Blade(0.3, 0.1, 0.2, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
         ToolContact(b.state, flat, path, [surface], contact=CONTACT)
@@ -149,7 +149,7 @@ def pressed_sheet(step):
     state = State(fem.functionspace(domain, ("Lagrange", 1, (2,))))
     ends = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(np.abs(x[0] - 2), 2))
     faces = mesh.locate_entities_boundary(domain, 1, lambda x: np.isclose(np.abs(x[1] - 0.1), 0.1))
-    path = Path.polyline([0, 1], [(2, 0.9), (2, -4.1)])
+    path = ToolPath.polyline([0, 1], [(2, 0.9), (2, -4.1)])
     ball = ToolContact(state, Ball(0.5), path, [Surface.exterior(state, faces)], contact=PenaltyContact(20.0))
     mechanics = Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], [Support(state, ends, i) for i in (0, 1)])
     return history(mechanics, 0.3, StepControl(step, step, smallest=1e-3))
@@ -173,7 +173,7 @@ def small_ball(step):
     )
     state = State(fem.functionspace(domain, ("Lagrange", 1, (2,))))
     top, base = (mesh.locate_entities_boundary(domain, 1, lambda x, y=y: np.isclose(x[1], y)) for y in (0, -1))
-    path = Path.polyline([0, 1], [(1, 0.11), (1, -0.4)])
+    path = ToolPath.polyline([0, 1], [(1, 0.11), (1, -0.4)])
     ball = ToolContact(state, Ball(0.1), path, [Surface.exterior(state, top)], contact=PenaltyContact(40 * E))
     mechanics = Mechanics(state, [Solid(state, NeoHookean(E, NU)), ball], [Support(state, base, i) for i in (0, 1)])
     return history(mechanics, 0.5, StepControl(step, step, smallest=1e-3))["tool_force_y"]
@@ -191,7 +191,7 @@ def test_no_step_carries_a_small_ball_between_the_points_of_the_surface(caplog):
 
 def ball_in(b, depth):
     """A ball of radius 0.3 that begins so deep in the top of a block, and moves on by 0.05."""
-    path = Path.polyline([0, 1], [(0.5, 1.3 - depth), (0.5, 1.25 - depth)])
+    path = ToolPath.polyline([0, 1], [(0.5, 1.3 - depth), (0.5, 1.25 - depth)])
     top = Surface.exterior(b.state, b.face(1, 1.0))
     return ToolContact(b.state, Ball(0.3), path, [top], contact=PenaltyContact(20.0), name="ball")
 
@@ -225,7 +225,7 @@ def test_coarse_mesh_is_named_with_numbers(caplog):
     b = make_blocks(n=8)
     top = Surface.exterior(b.state, b.face(1, 1.0))
     for name, radius in (("round", 0.125), ("sharp", 0.05)):
-        path = Path(lambda t: np.array([0.5, 1.1 - t]))
+        path = ToolPath(lambda t: np.array([0.5, 1.1 - t]))
         ToolContact(b.state, Blade(0.2, radius, 0.5), path, [top], contact=PenaltyContact(1.0), name=name)
     words = "sharp: facets of 0.125 do not resolve the tool's radius 0.05"
     assert words in str(b.state.verdict) and "round: facets" not in str(b.state.verdict)

@@ -198,14 +198,14 @@ def test_refuses_what_is_no_tool(kind, arguments, name):
 
 
 def test_polyline_goes_straight_and_rests_at_its_ends():
-    path = Path.polyline([1, 2, 4], [(0, 0), (1, 0), (1, -4)])
+    path = ToolPath.polyline([1, 2, 4], [(0, 0), (1, 0), (1, -4)])
     assert path.corners == (1, 2, 4)
     for time, place in ((0, (0, 0)), (1.5, (0.5, 0)), (3, (1, -2)), (9, (1, -4))):
         np.testing.assert_allclose(path.position(time), place)
 
 
 def test_saw_goes_to_and_fro_by_its_stroke():
-    path = Path.saw((0, 0, 1), (0, 0, -2), (4, 0, 0), period=0.5)
+    path = ToolPath.saw((0, 0, 1), (0, 0, -2), (4, 0, 0), period=0.5)
     places = np.array([path.position(t) for t in np.linspace(0, 0.5, 401)])
     assert np.ptp(places[:, 0]) == pytest.approx(4)
     np.testing.assert_allclose(places[-1], (0, 0, 0), atol=1e-12)
@@ -214,9 +214,9 @@ def test_saw_goes_to_and_fro_by_its_stroke():
 @pytest.mark.parametrize(
     ("make", "name"),
     [
-        (lambda: Path.polyline([0, 0], [(0, 0), (1, 1)]), "times"),
-        (lambda: Path.polyline([0, 1], [(0, 0)]), "points"),
-        (lambda: Path.saw((0,), (0,), (0,), 0.0), "period"),
+        (lambda: ToolPath.polyline([0, 0], [(0, 0), (1, 1)]), "times"),
+        (lambda: ToolPath.polyline([0, 1], [(0, 0)]), "points"),
+        (lambda: ToolPath.saw((0,), (0,), (0,), 0.0), "period"),
     ],
 )
 def test_refuses_what_is_no_path(make, name):

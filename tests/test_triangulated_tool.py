@@ -19,7 +19,7 @@ from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.pointed import Blade
-from cutsim.tools.shapes import Ball, Path
+from cutsim.tools.shapes import Ball, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 from cutsim.tools.triangulation import Triangulation
@@ -53,7 +53,7 @@ def drawn(gdim, depth, length=0.1, radius=R):
     """A tool that comes down on the top of the unit block, off its middle, and is drawn along it."""
     down, along = np.eye(gdim)[-1], np.eye(gdim)[0]
     start = np.full(gdim, 0.45) + (1 + radius - 0.45) * down
-    return Path.polyline([0, 1, 2], [start, start - depth * down, start - depth * down + length * along])
+    return ToolPath.polyline([0, 1, 2], [start, start - depth * down, start - depth * down + length * along])
 
 
 def indented(gdim, shape, path, n, degree=1, friction=FRICTION, comm=MPI.COMM_WORLD, **options):
@@ -178,7 +178,7 @@ def test_energy_of_friction_closes_with_the_penalty():
 @pytest.mark.parametrize(("gdim", "n"), [(2, 12), (3, 8)])
 def test_tool_that_moves_farther_in_a_step_than_a_facet(gdim, n):
     """The body is deep in the tool when the step begins; it is found nevertheless."""
-    path = Path.polyline([0, 1], [drawn(gdim, 0.0).position(0.0), drawn(gdim, 0.15).position(1.0)])
+    path = ToolPath.polyline([0, 1], [drawn(gdim, 0.0).position(0.0), drawn(gdim, 0.15).position(1.0)])
     ends = []
     for step in (0.25, 1.0):
         control = StepControl(first=step, largest=step, line_searches=LINE_SEARCHES)
@@ -194,7 +194,7 @@ def test_tool_that_moves_farther_in_a_step_than_a_facet(gdim, n):
 def test_tool_that_begins_in_the_body(depth):
     """It pushes inwards, the more the deeper, also where its middle is below the surface; alike on all meshes."""
     start = np.array([0.45, 1 + R - depth])
-    path = Path.polyline([0, 1], [start, start - (0.0, 0.01)])
+    path = ToolPath.polyline([0, 1], [start, start - (0.0, 0.01)])
     force = []
     for n, level in ((4, 1), (8, 2)):
         options = {"friction": None, "contact": PenaltyContact(20.0)}
@@ -207,7 +207,7 @@ def test_tool_that_begins_in_the_body(depth):
 @pytest.mark.parametrize("friction", [None, Coulomb(50.0, 7.0), Coulomb(0.4, 1e3)], ids=["smooth", "stick", "slip"])
 @pytest.mark.parametrize(("gdim", "degree"), [(2, 1), (2, 2), (3, 1)])
 def test_tangent(gdim, degree, friction):
-    path = Path(lambda t: drawn(gdim, 0.1).position(1.0) + 0.03 * t * np.eye(gdim)[0])
+    path = ToolPath(lambda t: drawn(gdim, 0.1).position(1.0) + 0.03 * t * np.eye(gdim)[0])
     mechanics, tool = indented(gdim, ball(gdim, 1), path, 4, degree, friction, MPI.COMM_SELF, search=0.5)
     state = mechanics.state
     state.u_old.x.array[:] = wavy(state.V, 1, 0.01)

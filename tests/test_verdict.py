@@ -19,7 +19,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.materials.elastic import NeoHookean
 from cutsim.results.output import claim_folder, read_history
 from cutsim.results.recording import Recording
-from cutsim.tools.shapes import Ball, Path, Plane
+from cutsim.tools.shapes import Ball, Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact, doubt_units
 from helpers.blocks import make_blocks
 from helpers.laws import NU, E
@@ -38,7 +38,7 @@ def moved(b, path, *terms, law=TOUGH, **options):
 
 def plate(b, depth):
     """A plane that comes down on the top by a depth, in unit time."""
-    path = Path.polyline([0, 1], [(0.5, 1.01), (0.5, 1.0 - depth)])
+    path = ToolPath.polyline([0, 1], [(0.5, 1.01), (0.5, 1.0 - depth)])
     surface = Surface.exterior(b.state, b.face(1, 1.0))
     return ToolContact(b.state, Plane((0.0, -1.0)), path, [surface], contact=PenaltyContact(200.0, 1e-3), name="plate")
 

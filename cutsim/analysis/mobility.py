@@ -6,12 +6,11 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.arrays import Array
 from cutsim.base.assembly import box
 from cutsim.fields.pieces import connected_pieces
 from cutsim.fields.state import State
 from cutsim.solvers.preconditioners import rigid_motions
-
-Array = NDArray[np.float64]
 
 # resistance to a motion that is none, over that of the body to a stretch of the same size
 _NOTHING = 1e-10

@@ -8,13 +8,12 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.analysis.mobility import free_motion
+from cutsim.base.arrays import Array
 from cutsim.base.terms import Advising, Body, Term, offering
 from cutsim.bodies.inertia import Inertia
 from cutsim.bodies.loads import Support
 from cutsim.fields.state import State
 from cutsim.solvers.newton import NonlinearProblem
-
-Array = NDArray[np.float64]
 
 
 class Motion(Protocol):

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-Array = NDArray[np.float64]
+from cutsim.base.arrays import Array
 
 
 def integrate(form: fem.Form) -> float:

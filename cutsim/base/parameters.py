@@ -13,7 +13,7 @@ from cutsim.base.checks import finite, require, require_number
 from cutsim.base.memory import Memory
 
 Law = TypeVar("Law")
-History = Callable[[float], float]
+TimeFunction = Callable[[float], float]
 
 
 def with_constants(mesh: Mesh, law: Law) -> Law:
@@ -112,7 +112,7 @@ class Schedule:
         ValueError: The value, or that of the function at a time, is not a finite number.
     """
 
-    def __init__(self, mesh: Mesh, memory: Memory, value: float | History, name: str, owner: str) -> None:
+    def __init__(self, mesh: Mesh, memory: Memory, value: float | TimeFunction, name: str, owner: str) -> None:
         self._value, self._name = value, name
         self.constant = fem.Constant(mesh, default_scalar_type(self._at(0.0)))
         memory.array(f"{owner}: {name}", self.constant)

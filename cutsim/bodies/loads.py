@@ -12,7 +12,7 @@ from cutsim.base.assembly import global_dot, nodal_forces, resultant
 from cutsim.base.checks import count, require, require_number, require_numbers
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr, cofactor
-from cutsim.base.parameters import History, Schedule
+from cutsim.base.parameters import Schedule, TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns, Term
 from cutsim.fields.space import locate_dofs
@@ -53,7 +53,7 @@ class Support:
         state: State,
         entities: NDArray[np.int32],
         component: int | tuple[float, ...],
-        value: float | History = 0.0,
+        value: float | TimeFunction = 0.0,
         *,
         name: str | None = None,
         dim: int | None = None,
@@ -116,7 +116,7 @@ def _axis(component: int | tuple[float, ...], gdim: int) -> tuple[int, int]:
     return axis, 1 if component[axis] > 0 else -1
 
 
-def _opposite(value: float | History) -> float | History:
+def _opposite(value: float | TimeFunction) -> float | TimeFunction:
     if callable(value):
         return lambda time: -value(time)
     return -value if isinstance(value, int | float) else value  # what is no number is refused later
@@ -129,7 +129,7 @@ class Load(Term, ABC):
         self,
         state: State,
         facets: NDArray[np.int32],
-        factor: History,
+        factor: TimeFunction,
         parameter: str,
         name: str,
         corners: tuple[float, ...],
@@ -202,7 +202,7 @@ class Traction(Load):
         state: State,
         facets: NDArray[np.int32],
         direction: tuple[float, ...],
-        factor: History,
+        factor: TimeFunction,
         *,
         name: str = "load",
         corners: tuple[float, ...] = (),
@@ -240,7 +240,7 @@ class Pressure(Load):
         self,
         state: State,
         facets: NDArray[np.int32],
-        pressure: History,
+        pressure: TimeFunction,
         *,
         name: str = "pressure",
         corners: tuple[float, ...] = (),

@@ -3,12 +3,10 @@
 import numpy as np
 from dolfinx.mesh import Mesh, compute_midpoints, entities_to_geometry
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from cutsim.base.arrays import Array
 from cutsim.base.checks import place
 from cutsim.base.compat import geometry_nodes
-
-Array = NDArray[np.float64]
 
 # determinant of the Jacobian over the product of the lengths of its columns that counts as none
 _NOTHING = 1e-10

@@ -7,13 +7,11 @@ from itertools import pairwise
 import numpy as np
 from dolfinx.mesh import CellType, GhostMode, Mesh, create_box, create_rectangle
 from mpi4py import MPI
-from numpy.typing import NDArray
 
+from cutsim.base.arrays import Array
 from cutsim.base.checks import between, count, positive, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.fields.meshing import Marker, TaggedMesh, tag_mesh
-
-Array = NDArray[np.float64]
 
 #: Sides of the block; names that no layer may have.
 SIDES = ("notch", "top_left", "top_right", "bottom", "far_left", "far_right", "front", "back")

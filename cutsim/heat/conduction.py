@@ -12,11 +12,11 @@ from cutsim.base.assembly import integrate
 from cutsim.base.checks import as_array, positive, require, require_number
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
-from cutsim.base.parameters import History, Schedule
+from cutsim.base.parameters import Schedule, TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.bodies.solid import Solid
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.balance import HeatTerm
+from cutsim.heat.audit import HeatTerm
 
 
 class Moved(Protocol):
@@ -58,7 +58,7 @@ class HeatBody(HeatTerm):
         conductivity: float | ArrayLike,
         density: float | None = None,
         body: Solid | NDArray[np.int32] | None = None,
-        source: float | History = 0.0,
+        source: float | TimeFunction = 0.0,
         name: str = "body",
     ) -> None:
         super().__init__(temperature, name)

@@ -13,7 +13,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.fields.points import Values
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.balance import HeatTerm
+from cutsim.heat.audit import HeatTerm
 from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.exchange import HeatExchange, contact_columns
 from cutsim.interface.crack import Crack

@@ -9,7 +9,7 @@ from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.balance import HeatTerm
+from cutsim.heat.audit import HeatTerm
 from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.exchange import contact_columns
 from cutsim.heat.heat_pass import HeatPass

@@ -6,10 +6,10 @@ import ufl
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
-from cutsim.base.parameters import History, Schedule
+from cutsim.base.parameters import Schedule, TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.balance import HeatTerm
+from cutsim.heat.audit import HeatTerm
 from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
 from cutsim.heat.exchange import HeatExchange, contact_columns
 from cutsim.tools.tool_contact import ToolContact
@@ -40,7 +40,7 @@ class ToolHeat(HeatTerm):
         temperature: Temperature,
         tool: ToolContact,
         law: ContactHeat | AdiabaticTool,
-        tool_temperature: float | History | None = None,
+        tool_temperature: float | TimeFunction | None = None,
         *,
         name: str | None = None,
     ) -> None:

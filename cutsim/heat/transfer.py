@@ -14,8 +14,8 @@ from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns, offering
 from cutsim.base.verdict import CLOSURE
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.balance import HeatBalance, HeatTerm
-from cutsim.heat.loads import PrescribedTemperature
+from cutsim.heat.audit import HeatAudit, HeatTerm
+from cutsim.heat.boundary import PrescribedTemperature
 from cutsim.solvers.balance import Balance
 from cutsim.solvers.convergence import Criteria, Tolerances
 
@@ -75,7 +75,7 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
         self.temperature, self.prescribed = temperature, tuple(prescribed)
         absolute = max(abs(temperature.maximum() - temperature.absolute_zero), 1.0)
         scale = SMALLEST_HEAT * absolute * sum(b.content for b in bodies)
-        self._audit = self.state.memory.value("heat: audit", HeatBalance(scale=scale))
+        self._audit = self.state.memory.value("heat: audit", HeatAudit(scale=scale))
 
     @property
     def fields(self) -> Mapping[str, Expr]:
@@ -83,12 +83,12 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
         return {"temperature": self.temperature.value}
 
     @property
-    def audit(self) -> HeatBalance:
+    def audit(self) -> HeatAudit:
         """Audit of heat of the committed state."""
         return self._audit.committed
 
     @property
-    def trial_audit(self) -> HeatBalance:
+    def trial_audit(self) -> HeatAudit:
         """Audit of heat including the trial step."""
         return self._audit.trial
 

@@ -131,7 +131,7 @@ def unstable_stretches(material: Material, lowest: float, highest: float) -> dic
         highest: Largest stretch.
 
     Returns:
-        Path -> smallest and largest unstable stretch; empty if there are none.
+        ToolPath -> smallest and largest unstable stretch; empty if there are none.
 
     Raises:
         ValueError: The stretches are not positive numbers in this order.

@@ -31,7 +31,7 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.history import InterfaceHistory
-from cutsim.interface.law import Response, respond
+from cutsim.interface.modified_contact import Response, respond
 
 #: Fields of a crack for output.
 FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
@@ -69,7 +69,7 @@ class Crack(Term):
         young: Young's modulus of the softer neighbour, for the automatic penalty and the mesh check [stress].
         name: Name in messages and output.
         contact: Contact law of the closed crack; by default a penalty of 10 E/h.
-        penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
+        allowed_penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
         normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
 
     Attributes:
@@ -97,14 +97,14 @@ class Crack(Term):
         young: float,
         name: str = "crack",
         contact: PenaltyContact | None = None,
-        penetration: float | None = None,
+        allowed_penetration: float | None = None,
         normal: Literal["current", "reference"] = "current",
     ) -> None:
         require_number("young", young, positive)
-        require_number("penetration", penetration, positive.or_none)
+        require_number("allowed_penetration", allowed_penetration, positive.or_none)
         self.name, self.state, self.law, self.young = name, state, law, young
         self._current = normal == "current"
-        self._allowed_penetration = penetration
+        self._allowed_penetration = allowed_penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
         check_cracked(state.V, facets, name)
         self.points = FacetPoints(

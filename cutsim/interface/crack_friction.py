@@ -3,7 +3,6 @@
 from typing import Literal
 
 import ufl
-from dolfinx import fem
 
 from cutsim.base.checks import positive, require_number
 from cutsim.base.compat import EntityMaps
@@ -11,6 +10,7 @@ from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.points import Values
+from cutsim.fields.temperature import Temperature
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
@@ -25,13 +25,14 @@ class CrackFriction(Term):
 
     Args:
         crack: The crack.
-        law: Friction law; without a tangential penalty of its own it takes that of the normal contact.
+        law: Friction law, or the coefficient of Coulomb's; without a tangential penalty of its own it takes that of the
+            normal contact.
         acts_on: "broken": on the broken fraction.  "contact": wherever the faces are pressed together, broken or not.
-            "thesis": as "contact", and the tension of the bond counts as pressure as in (4.52) of the thesis; an open
-            gap then rubs, which is physically wrong, so that a warning is given.
-        stick: If given, augmentation until no sticking facet slides more than this in a step, in the mean [length].
-        temperature: Temperature on a scalar space cracked like the displacement, for laws that depend on it; the hotter
-            side counts.
+            "tension": as "contact", and the tension of the bond counts as pressure, as in (4.52) of the thesis; then
+            an open gap rubs, which is physically wrong, so that a warning is given.
+        allowed_slip: If given, augmentation until no sticking facet slides more than this in a step, in the mean
+            [length].
+        temperature: Temperature, cracked like the displacement, for laws that depend on it; the hotter side counts.
 
     Raises:
         ValueError: A parameter is outside its range.
@@ -43,32 +44,32 @@ class CrackFriction(Term):
     def __init__(
         self,
         crack: Crack,
-        law: FrictionLaw,
+        law: FrictionLaw | float,
         *,
-        acts_on: Literal["broken", "contact", "thesis"] = "broken",
-        stick: float | None = None,
-        temperature: fem.Function | None = None,
+        acts_on: Literal["broken", "contact", "tension"] = "broken",
+        allowed_slip: float | None = None,
+        temperature: Temperature | None = None,
     ) -> None:
-        require_number("stick", stick, positive.or_none)
-        if acts_on == "thesis":
-            words = f"{crack.name}: open faces rub (friction 'thesis'); use it for comparison only"
+        require_number("allowed_slip", allowed_slip, positive.or_none)
+        if acts_on == "tension":
+            words = f"{crack.name}: open faces rub (friction on 'tension'); use it for comparison only"
             crack.state.verdict.doubt(f"{crack.name}: friction", words)
         self.crack, self.name = crack, f"{crack.name}_friction"
         u = crack.state.u
         response, self._frame = crack.response(u), crack.frame(u)
-        tension = ufl.dot(response.cohesive, response.normal) if acts_on == "thesis" else 0.0
-        hotter = None if temperature is None else ufl.max_value(temperature("+"), temperature("-"))
+        tension = ufl.dot(response.cohesive, response.normal) if acts_on == "tension" else 0.0
+        hotter = None if temperature is None else ufl.max_value(temperature.value("+"), temperature.value("-"))
         self._share = response.damage[1] if acts_on == "broken" else ufl.as_ufl(1.0)
         self.slip = SlipHistory(
             crack.state,
             self.name,
             crack.points,
-            completed(law, crack.contact.stiffness),
+            completed("law", law, crack.contact.stiffness),
             ufl.as_vector([ufl.dot(response.jump, a) for a in self._frame]),
             response.pressure + tension,
-            ufl.as_ufl(0.0) if acts_on == "thesis" else response.penetration,
+            ufl.as_ufl(0.0) if acts_on == "tension" else response.penetration,
             share=self._share,
-            tolerance=stick,
+            tolerance=allowed_slip,
             temperature=hotter,
         )
 

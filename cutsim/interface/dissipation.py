@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cutsim.base.arrays import Array
 from cutsim.interface.cohesive import CohesiveLaw
-
-Array = NDArray[np.float64]
 
 _PLACES, _WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(5)[i] + (1.0, 0.0)[i]) for i in (0, 1))
 # loss that is not resolved, as a fraction of the toughness

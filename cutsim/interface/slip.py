@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import ufl
 
+from cutsim.base.checks import nonnegative, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import with_constants
@@ -17,9 +18,23 @@ from cutsim.interface.friction import Coulomb, FrictionLaw
 _STICKS = 1e-9
 
 
-def completed(law: FrictionLaw, stiffness: float) -> FrictionLaw:
-    """The law with a tangential penalty: its own, or that of the normal contact."""
-    return replace(law, stiffness=stiffness) if isinstance(law, Coulomb) and law.stiffness is None else law
+def completed(name: str, friction: FrictionLaw | float, stiffness: float) -> FrictionLaw:
+    """The law with a tangential penalty: its own, or that of the normal contact.
+
+    Args:
+        name: Name of the parameter in messages.
+        friction: A law, or the coefficient of Coulomb's.
+        stiffness: Penalty of the normal contact [stress/length].
+
+    Raises:
+        ValueError: It is neither, or a negative number.
+    """
+    if not isinstance(friction, FrictionLaw):
+        require_number(name, friction, nonnegative)
+        return Coulomb(float(friction), stiffness)
+    if isinstance(friction, Coulomb) and friction.stiffness is None:
+        return replace(friction, stiffness=stiffness)
+    return friction
 
 
 def _closed(before: Expr, now: Expr) -> Expr:

@@ -11,12 +11,10 @@ so that the parameters of the material are those of slow deformation.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cutsim.base.arrays import Array
 from cutsim.base.checks import positive, require_numbers
 from cutsim.base.signatures import checked
-
-Array = NDArray[np.float64]
 
 
 @checked

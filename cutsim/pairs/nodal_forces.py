@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cutsim.pairs.kinematics import PairKinematics
+from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.pairing import Array, Indices
-from cutsim.pairs.points import Pairs
+from cutsim.pairs.partners import PairKinematics
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import require
 from cutsim.fields.sizes import incidence
 from cutsim.pairs.overlap import inside_body
-from cutsim.pairs.pairing import Array, Indices, Shape
+from cutsim.pairs.pairing import Array, FacetShape, Indices
 
 
 class OuterSurface:
@@ -75,7 +75,7 @@ class Master(Protocol):
         global_nodes: Global nodes of each facet; −1, which PETSc passes over, for one that has no unknowns.
     """
 
-    shape: Shape
+    shape: FacetShape
     sides: Array
     reference: Array
     global_nodes: Indices
@@ -150,7 +150,7 @@ def _cells_of(mesh: Mesh, facets: NDArray[np.int32]) -> tuple[NDArray[np.int32],
     return cells, np.argmax(per_cell == np.asarray(facets)[:, None], axis=1).astype(np.int32)
 
 
-def _facet_orders(V: fem.FunctionSpace) -> tuple[Shape, NDArray[np.int32]]:
+def _facet_orders(V: fem.FunctionSpace) -> tuple[FacetShape, NDArray[np.int32]]:
     """Reference shape of the facets, and for each facet of a cell its nodes in the order of that shape."""
     cell = V.element.basix_element
     require("degree", cell.degree, cell.degree in (1, 2), "1 or 2: fields on the surfaces of a pair")
@@ -165,4 +165,4 @@ def _facet_orders(V: fem.FunctionSpace) -> tuple[Shape, NDArray[np.int32]]:
         places = x[0] + element.points @ edges
         distances = np.linalg.norm(places[:, None] - cell.points[dofs][None], axis=-1)
         orders.append(dofs[distances.argmin(axis=1)])
-    return Shape(element), np.array(orders, dtype=np.int32)
+    return FacetShape(element), np.array(orders, dtype=np.int32)

@@ -45,7 +45,7 @@ def inside_surface(points: Array, facets: Array) -> NDArray[np.bool_]:
     """Which points lie in a closed surface of segments or triangles with outward normals, by its winding number.
 
     Args:
-        points: Shape (points, dimension).
+        points: FacetShape (points, dimension).
         facets: Nodes of the facets, shape (facets, nodes, dimension).
     """
     inside = [np.empty(0, dtype=bool)]

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Array = NDArray[np.float64]
+from cutsim.base.arrays import Array
+
 Indices = NDArray[np.int64]
 
 #: How far outside a facet, in reference coordinates, a ray still meets it: no ray slips through between two facets.
@@ -21,7 +22,7 @@ _ITERATIONS, _ACCURACY, _OUTSIDE = 20, 1e-14, 1.0
 
 
 @dataclass(frozen=True)
-class Shape:
+class FacetShape:
     """Reference facet that all facets of a surface share.
 
     Args:
@@ -36,7 +37,7 @@ class Shape:
         return np.asarray(basix.geometry(self.element.cell_type).mean(axis=0))
 
     def values(self, xi: Array) -> tuple[Array, Array]:
-        """Shape functions, shape (n, nodes), and their derivatives, shape (n, directions, nodes), at n points."""
+        """FacetShape functions, shape (n, nodes), and their derivatives, shape (n, directions, nodes), at n points."""
         # one more point, because there may be none and basix aborts then
         tables = self.element.tabulate(1, np.vstack([xi, self.centre]))[:, :-1, :, 0]
         return tables[0], np.moveaxis(tables[1:], 0, 1)
@@ -96,7 +97,13 @@ def near_facets(rays: Array, master: Array, margin: float) -> tuple[Indices, Ind
 
 
 def project(
-    x: Array, frames: Array, pairs: tuple[Indices, Indices], master: Array, sides: Array, shape: Shape, search: float
+    x: Array,
+    frames: Array,
+    pairs: tuple[Indices, Indices],
+    master: Array,
+    sides: Array,
+    shape: FacetShape,
+    search: float,
 ) -> Hits:
     """Where rays along the normals of points first meet the master surface.
 
@@ -143,7 +150,7 @@ def _in_frames(
     return np.einsum("nij,nbj->nbi", frames[points], master[facets] - x[points, None]), near
 
 
-def _solve(y: Array, shape: Shape) -> Array:
+def _solve(y: Array, shape: FacetShape) -> Array:
     """Reference coordinates at which facets pass through the origin of the plane, by Newton's method."""
     centre = shape.centre
     xi = np.tile(centre, (len(y), 1))

@@ -16,9 +16,10 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
-from cutsim.pairs.kinematics import PairKinematics
-from cutsim.pairs.law import PairLaws
+from cutsim.interface.slip import completed
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface
+from cutsim.pairs.pair_law import PairLaws
+from cutsim.pairs.partners import PairKinematics
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
 
 _AXES = "xyz"
@@ -34,14 +35,17 @@ class SurfacePair(Term):
         state: Displacement, of degree 1 or 2, and time.
         slave_facets: Local exterior facets of the slave surface, ghosts included; the finer or softer one.
         master_facets: Those of the master surface.
-        law: Cohesive law, for fixed pairs; None for contact only.
+        law: Cohesive law, with small sliding only; None for contact only.
         young: Young's modulus of the softer body, for the automatic penalty [stress].
         contact: Contact law; by default a penalty of 10 E/h.
-        friction: Friction law, None for none; without a tangential penalty of its own it takes that of the contact.
-        fixed: Whether each point keeps its partner of the reference configuration: for bonds, and for small slides.
+        friction: Friction law, or the coefficient of Coulomb's, None for none; without a tangential penalty of its own
+            it takes that of the contact.
+        small_sliding: Whether each point keeps its partner of the reference configuration, as bonds do.
             Otherwise partners are found in the current configuration.
-        penetration: If given, Uzawa augmentation until no facet penetrates more than this, in the mean [length].
-        stick: If given, augmentation until no sticking facet slides more than this in a step, in the mean [length].
+        allowed_penetration: If given, Uzawa augmentation until no facet penetrates more than this, in the mean
+            [length].
+        allowed_slip: If given, augmentation until no sticking facet slides more than this in a step, in the mean
+            [length].
         two_pass: Whether each surface is slave once.
         search: Largest distance of a partner, on either side [length]; by default the mean size of the slave facets.
             Points that lie in the other body from the start, or come into it in a step, find theirs at any depth.
@@ -71,18 +75,19 @@ class SurfacePair(Term):
         *,
         young: float,
         contact: PenaltyContact | None = None,
-        friction: FrictionLaw | None = None,
-        penetration: float | None = None,
-        stick: float | None = None,
-        fixed: bool = False,
+        friction: FrictionLaw | float | None = None,
+        allowed_penetration: float | None = None,
+        allowed_slip: float | None = None,
+        small_sliding: bool = False,
         two_pass: bool = False,
         search: float | None = None,
         name: str = "pair",
     ) -> None:
         require_number("young", young, positive)
-        for parameter, value in {"penetration": penetration, "stick": stick, "search": search}.items():
-            require_number(parameter, value, positive.or_none)
-        require("fixed", fixed, fixed or law is None, "True with a cohesive law")
+        require_number("allowed_penetration", allowed_penetration, positive.or_none)
+        require_number("allowed_slip", allowed_slip, positive.or_none)
+        require_number("search", search, positive.or_none)
+        require("small_sliding", small_sliding, small_sliding or law is None, "True with a cohesive law")
         shared = state.mesh.comm.allreduce(len(np.intersect1d(slave_facets, master_facets)))
         require("slave_facets", shared, shared == 0, "no facet of master_facets")
         self.name, self.state, self.law = name, state, law
@@ -94,7 +99,8 @@ class SurfacePair(Term):
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
             doubt_law(state.verdict, name, law, young, sizes[0])
-        laws = PairLaws(law, self.contact, friction, penetration, stick)
+        rubbing = completed("friction", friction, self.contact.stiffness) if friction else None
+        laws = PairLaws(law, self.contact, rubbing, allowed_penetration, allowed_slip)
         surfaces = [OuterSurface(state.V, p.facets) for p in points]
         self.facets = tuple(p.facets for p in points)
         self.entities = np.concatenate([np.column_stack([s.cells, s.local])[s.owned].ravel() for s in surfaces])
@@ -109,7 +115,7 @@ class SurfacePair(Term):
                     f"{name} pass {i + 1}",
                     surfaces[i],
                     masters[1 - i],
-                    fixed=fixed,
+                    small_sliding=small_sliding,
                     search=search or sizes[0],
                     size=sizes[i],
                 ),

@@ -12,11 +12,11 @@ from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
 from cutsim.interface.history import GAUSS, TRAPEZOID, InterfaceHistory
 from cutsim.pairs import nodal_forces
-from cutsim.pairs.kinematics import DEGREES, PairKinematics
-from cutsim.pairs.law import PairLaw, PairLaws
+from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.nodal_forces import Tractions
+from cutsim.pairs.pair_law import PairLaw, PairLaws
 from cutsim.pairs.pairing import Array
-from cutsim.pairs.points import Pairs
+from cutsim.pairs.partners import DEGREES, PairKinematics
 
 # points whose tangents are held in memory at a time
 _CHUNK = 10_000
@@ -70,7 +70,7 @@ class SurfacePass:
         self._dim = state.mesh.geometry.dim
         own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
         self.weights = weight * own.ravel()
-        rule = GAUSS if kinematics.fixed else TRAPEZOID
+        rule = GAUSS if kinematics.small_sliding else TRAPEZOID
         self.history = InterfaceHistory(state.memory, name, points, laws.cohesive, rule, ("held",))
         self._law = PairLaw(state, name, points, laws, self.history, kinematics.pairs(self._start()))
         self.slip = self._law.slip

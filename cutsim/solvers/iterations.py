@@ -9,7 +9,7 @@ from cutsim.base.options import Options
 from cutsim.solvers.convergence import BC_ROUNDING, Criteria, Iteration, Judge, Reason
 from cutsim.solvers.lifetime import weakly
 from cutsim.solvers.linear import LinearSolver
-from cutsim.solvers.measures import Measures
+from cutsim.solvers.norms import Norms
 from cutsim.solvers.system import System
 
 LINE_SEARCHES = ("l2", "bt", "basic")
@@ -80,7 +80,7 @@ class Iterations:
 
     def __init__(self, system: System, criteria: Criteria, options: Options) -> None:
         self._system, self._options = system, options
-        self._measures = Measures(system)
+        self._measures = Norms(system)
         # the vector is not that of u, which line searches would spoil as their own start
         self._x = PETSc.Vec().createWithArray(system.unknowns, comm=system.comm)
         self._f = self._x.duplicate()

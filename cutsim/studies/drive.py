@@ -10,7 +10,7 @@ from cutsim.base.checks import above, at_least, between, positive, require, requ
 from cutsim.base.signatures import checked
 from cutsim.studies.frame import Frame
 from cutsim.tools.pointed import Pointed
-from cutsim.tools.shapes import Path
+from cutsim.tools.shapes import ToolPath
 
 #: Depth of the tip, as a part of the depth of the notch, when the push begins.
 TIP_IN_NOTCH = 0.8
@@ -115,9 +115,11 @@ class Motion:
         leg = np.inf if self.turning_depth is None else self.turning_depth - self.start_depth
         return self.start_depth + (way if way <= leg else abs(2 * leg - way))
 
-    def path(self, frame: Frame, tool: Pointed) -> Path:
-        """Path of a tool, or of a half of it, in a frame."""
-        return Path(self._spread(frame, tool) if tool.side and self.start_depth else self._lower(frame), self.corners)
+    def path(self, frame: Frame, tool: Pointed) -> ToolPath:
+        """ToolPath of a tool, or of a half of it, in a frame."""
+        return ToolPath(
+            self._spread(frame, tool) if tool.side and self.start_depth else self._lower(frame), self.corners
+        )
 
     def _lower(self, frame: Frame) -> Callable[[float], NDArray[np.float64]]:
         return lambda time: frame.point(self.depth(time))

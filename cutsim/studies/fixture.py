@@ -10,7 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import finite, require, require_number
-from cutsim.base.parameters import History
+from cutsim.base.parameters import TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.bodies.loads import Support
 from cutsim.studies.body import CrackedBody
@@ -106,7 +106,7 @@ STANDING = Fixture()
 
 
 def _held(
-    body: CrackedBody, entities: NDArray[np.int32], direction: Array, value: float | History = 0.0, **options: Any
+    body: CrackedBody, entities: NDArray[np.int32], direction: Array, value: float | TimeFunction = 0.0, **options: Any
 ) -> Support:
     return Support(body.state, entities, tuple(direction), value, **options)
 

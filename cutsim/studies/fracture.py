@@ -11,15 +11,14 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx.mesh import compute_midpoints
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from cutsim.base.arrays import Array
 from cutsim.base.assembly import integrate
 from cutsim.base.checks import between, nonnegative, positive, require, require_number, require_numbers
 from cutsim.base.compat import form
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
-
-Array = NDArray[np.float64]
 
 #: χ of `EndNotchedBeam` for isotropic arms, whatever Poisson's ratio (Bao, Ho, Suo and Fan 1992).
 ENF_CORRECTION = 0.206

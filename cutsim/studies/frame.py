@@ -7,6 +7,7 @@ import numpy as np
 from dolfinx.mesh import Mesh, compute_midpoints
 from numpy.typing import NDArray
 
+from cutsim.base.arrays import Array
 from cutsim.base.checks import require
 from cutsim.fields.sizes import global_range
 from cutsim.fields.twins import facet_nodes
@@ -14,7 +15,6 @@ from cutsim.interface.crack import Crack
 from cutsim.studies.body import CrackedBody
 from cutsim.tools.pointed import Pointed
 
-Array = NDArray[np.float64]
 Facets = NDArray[np.int32]
 
 #: Distance from a plane that is none, over the depth of the body: meshes come with six digits at times.

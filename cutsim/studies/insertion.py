@@ -14,7 +14,7 @@ from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.fields.state import State
 from cutsim.interface.crack import Crack
-from cutsim.interface.friction import Coulomb, FrictionLaw
+from cutsim.interface.friction import FrictionLaw
 from cutsim.results.recording import Columns
 from cutsim.studies.body import CrackedBody
 from cutsim.studies.cut_area import CutArea
@@ -90,14 +90,13 @@ class Insertion:
         Raises:
             ValueError: A parameter is outside its range, the tool does not fit body or notch, or a group is missing.
         """
-        law = _friction(friction)
         fixture.check(body)
         _check_tool(tool, body)
         frame = Frame.of(body, tool, fixture.plate, fixture.symmetry if fixture.halved(body) else None)
         _check_notch(body, tool, frame, notch)
         motion = Motion.of(drive, tool, notch, frame.height)
         doubt_units(body.state.verdict, _kind(tool), tool, frame.height)
-        contacts = _contacts(body, tool, frame, motion, fixture.top, law)
+        contacts = _contacts(body, tool, frame, motion, fixture.top, friction)
         parts, plate = ToolParts(contacts, tool), fixture.support(body, frame)
         problem = Mechanics(
             body.state,
@@ -152,14 +151,6 @@ class Insertion:
         return rows | self.body.columns(columns)
 
 
-def _friction(friction: float | FrictionLaw) -> FrictionLaw | None:
-    """A coefficient as a law; None for a smooth tool."""
-    if isinstance(friction, FrictionLaw):
-        return friction
-    require_number("friction", friction, nonnegative)
-    return Coulomb(friction) if friction else None
-
-
 def _check_tool(tool: Pointed, body: CrackedBody) -> None:
     """Refuse half a tool, one given in degrees, and one of another kind than the body."""
     require("tool.side", tool.side, tool.side == 0, "0, the whole tool")
@@ -191,7 +182,7 @@ def _contacts(
     frame: Frame,
     motion: Motion,
     top: tuple[str, str],
-    friction: FrictionLaw | None,
+    friction: float | FrictionLaw,
 ) -> tuple[ToolContact, ...]:
     """The tool on each face of each part of the crack."""
     plus = frame.side(body.cracks[0])

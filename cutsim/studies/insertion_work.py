@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from cutsim.base.arrays import Array
 from cutsim.base.checks import between, require, require_number
 from cutsim.studies.insertion import Insertion
 from cutsim.tools.tool_parts import PARTS
 
-Array = NDArray[np.float64]
 History = Mapping[str, Array]
 
 

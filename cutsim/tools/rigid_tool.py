@@ -12,7 +12,7 @@ from cutsim.base.terms import Term
 from cutsim.fields.state import State
 from cutsim.interface.doubts import doubt_penetration
 from cutsim.interface.slip import SlipHistory
-from cutsim.tools.shapes import Path
+from cutsim.tools.shapes import ToolPath
 
 _AXES = "xyz"
 _Action = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -33,7 +33,7 @@ class RigidTool(Term, ABC):
         ValueError: The path has another dimension than the mesh.
     """
 
-    def __init__(self, state: State, path: Path, name: str) -> None:
+    def __init__(self, state: State, path: ToolPath, name: str) -> None:
         gdim = state.mesh.geometry.dim
         start = _position(path, 0.0, gdim)
         self.name, self.state, self.path = name, state, path
@@ -118,7 +118,7 @@ class RigidTool(Term, ABC):
         return f"{self.name}: untouched"
 
 
-def _position(path: Path, time: float, gdim: int) -> NDArray[np.float64]:
+def _position(path: ToolPath, time: float, gdim: int) -> NDArray[np.float64]:
     """Where a path is, if that is a place of the mesh's dimension."""
     position = as_array(f"path({time:.6g})", path.position(time))
     require(f"path({time:.6g})", position, position.shape == (gdim,), f"a position of {gdim} components")

@@ -169,7 +169,7 @@ class Plane:
 
 @checked
 @dataclass(frozen=True)
-class Path:
+class ToolPath:
     """Prescribed motion of a tool's reference point.
 
     Args:
@@ -185,7 +185,7 @@ class Path:
 
     @classmethod
     @checked
-    def polyline(cls, times: Sequence[float], points: Sequence[Sequence[float]]) -> "Path":
+    def polyline(cls, times: Sequence[float], points: Sequence[Sequence[float]]) -> "ToolPath":
         """Straight motion between points, at rest before the first and after the last time.
 
         Raises:
@@ -208,7 +208,7 @@ class Path:
         velocity: Sequence[float],
         stroke: Sequence[float],
         period: float,
-    ) -> "Path":
+    ) -> "ToolPath":
         """Constant velocity with a sinusoidal draw: x₀ + v t + ½ stroke sin(2πt/period).
 
         Args:

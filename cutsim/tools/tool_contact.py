@@ -17,12 +17,13 @@ from cutsim.base.verdict import Verdict
 from cutsim.fields.points import Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, completed
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
-from cutsim.tools.shapes import Path, Shape, check_directions
+from cutsim.tools.shapes import Shape, ToolPath, check_directions
 
 
 class Patch:
@@ -55,7 +56,7 @@ class Patch:
         position: fem.Constant,
         contact: PenaltyContact,
         friction: FrictionLaw | None,
-        temperature: fem.Function | None,
+        temperature: Temperature | None,
     ) -> None:
         self.surface = surface
         self.place = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
@@ -78,7 +79,7 @@ class Patch:
                 self._pressure,
                 self._penetration,
                 project=lambda slip: tangential(slip, normal),
-                temperature=None if temperature is None else surface.restrict(temperature),
+                temperature=None if temperature is None else surface.restrict(temperature.value),
             )
 
     def virtual_work(self, v: Expr) -> ufl.Form:
@@ -138,8 +139,8 @@ class ToolContact(RigidTool):
         path: Motion of its reference point.
         surfaces: Surfaces the tool can touch; each side of a crack by itself.
         contact: Contact law; the pressure acts per reference area.
-        friction: Friction law against the slip relative to the tool, None for a frictionless tool; without a tangential
-            penalty of its own it takes that of the contact law.
+        friction: Friction law against the slip relative to the tool, or the coefficient of Coulomb's, None for none;
+            without a tangential penalty of its own it takes that of the contact law.
         temperature: Temperature of the body, for friction laws that depend on it.
         name: Name in messages and output.
 
@@ -156,20 +157,20 @@ class ToolContact(RigidTool):
         self,
         state: State,
         shape: Shape,
-        path: Path,
+        path: ToolPath,
         surfaces: Sequence[Surface],
         *,
         contact: PenaltyContact,
-        friction: FrictionLaw | None = None,
-        temperature: fem.Function | None = None,
+        friction: FrictionLaw | float | None = None,
+        temperature: Temperature | None = None,
         name: str = "tool",
     ) -> None:
         super().__init__(state, path, name)
         require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
         check_directions(shape, state.mesh.geometry.dim)
         self.shape, self.contact, self.friction = shape, contact, friction
-        self.symmetric = friction is None
-        law = None if friction is None else completed(friction, contact.stiffness)
+        law = completed("friction", friction, contact.stiffness) if friction else None
+        self.symmetric = law is None
         self.patches = tuple(Patch(state, name, s, shape, self.position, contact, law, temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)

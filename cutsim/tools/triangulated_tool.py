@@ -18,15 +18,15 @@ from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import SlipHistory
-from cutsim.pairs.kinematics import PairKinematics
-from cutsim.pairs.law import PairLaws
+from cutsim.interface.slip import SlipHistory, completed
 from cutsim.pairs.outer_surface import OuterSurface
 from cutsim.pairs.overlap import inside_surface
-from cutsim.pairs.pairing import Array, Indices, Shape
+from cutsim.pairs.pair_law import PairLaws
+from cutsim.pairs.pairing import Array, FacetShape, Indices
+from cutsim.pairs.partners import PairKinematics
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
 from cutsim.tools.rigid_tool import RigidTool
-from cutsim.tools.shapes import Path
+from cutsim.tools.shapes import ToolPath
 from cutsim.tools.triangulation import Triangulation
 
 
@@ -40,7 +40,7 @@ class RigidSurface:
 
     def __init__(self, triangulation: Triangulation, position: RememberedArray) -> None:
         kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[triangulation.points.shape[1]]
-        self.shape = Shape(basix.create_element(basix.ElementFamily.P, kind, 1))
+        self.shape = FacetShape(basix.create_element(basix.ElementFamily.P, kind, 1))
         self._corners, self._position = triangulation.corners, position
         self.sides: Array = np.ones(len(self._corners))
         self.reference: Array = self._corners + position.committed
@@ -86,7 +86,8 @@ class TriangulatedTool(RigidTool):
         surface: Surface of the tool relative to its reference point, the same on all ranks.
         path: Motion of the reference point.
         contact: Contact law; the pressure acts per reference area.
-        friction: Friction law, None for none; without a tangential penalty of its own it takes that of the contact law.
+        friction: Friction law, or the coefficient of Coulomb's, None for none; without a tangential penalty of its own
+            it takes that of the contact law.
         search: Largest distance of a partner, on either side, beyond what has moved in the step [length]; by
             default the mean size of the facets.
         name: Name in messages and output.
@@ -103,10 +104,10 @@ class TriangulatedTool(RigidTool):
         state: State,
         facets: NDArray[np.int32],
         surface: Triangulation,
-        path: Path,
+        path: ToolPath,
         *,
         contact: PenaltyContact,
-        friction: FrictionLaw | None = None,
+        friction: FrictionLaw | float | None = None,
         search: float | None = None,
         name: str = "tool",
     ) -> None:
@@ -119,8 +120,11 @@ class TriangulatedTool(RigidTool):
         master = RigidSurface(surface, self._position)
         self.contact, self._normal_size = contact, points.mean(normal_size(state.mesh, points.facets))
         slave = OuterSurface(state.V, points.facets)
-        kinematics = PairKinematics(state.memory, name, slave, master, fixed=False, search=search or size, size=size)
-        laws = PairLaws(None, contact, friction, None, None)
+        kinematics = PairKinematics(
+            state.memory, name, slave, master, small_sliding=False, search=search or size, size=size
+        )
+        law = completed("friction", friction, contact.stiffness) if friction else None
+        laws = PairLaws(None, contact, law, None, None)
         self.touch = _Touch(state, name, points, kinematics, laws, weight=1.0)
 
     @property

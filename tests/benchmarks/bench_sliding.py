@@ -52,7 +52,7 @@ def main() -> None:
     domain = cubes(options.upper, options.lower)
     state = State(fem.functionspace(domain, ("Lagrange", 1, (3,))))
     surfaces = [faces(domain, EDGE, above) for above in (not options.below, options.below)]
-    allowed = {"penetration": options.penetration, "stick": options.penetration}
+    allowed = {"allowed_penetration": options.penetration, "allowed_slip": options.penetration}
     pair = SurfacePair(state, *surfaces, young=1.0, friction=Coulomb(0.3), **allowed)
     bottom, top = faces(domain, 0.0, True), faces(domain, 2 * EDGE, False)
     motion = (lambda t: DRAW * max(t - 1, 0.0), 0.0, lambda t: -PRESS * min(t, 1.0))

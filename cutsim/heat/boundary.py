@@ -11,12 +11,12 @@ from cutsim.base.assembly import integrate
 from cutsim.base.checks import nonnegative, require, require_number, require_numbers
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
-from cutsim.base.parameters import History, Schedule
+from cutsim.base.parameters import Schedule, TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.balance import HeatTerm
+from cutsim.heat.audit import HeatTerm
 
 
 class _SurfaceHeat(HeatTerm, ABC):
@@ -26,7 +26,7 @@ class _SurfaceHeat(HeatTerm, ABC):
         self,
         temperature: Temperature,
         facets: NDArray[np.int32],
-        value: float | History,
+        value: float | TimeFunction,
         parameter: str,
         name: str,
         corners: tuple[float, ...],
@@ -87,7 +87,7 @@ class HeatFlux(_SurfaceHeat):
         self,
         temperature: Temperature,
         facets: NDArray[np.int32],
-        flux: float | History,
+        flux: float | TimeFunction,
         *,
         name: str = "flux",
         corners: tuple[float, ...] = (),
@@ -119,7 +119,7 @@ class Convection(_SurfaceHeat):
         temperature: Temperature,
         facets: NDArray[np.int32],
         coefficient: float,
-        ambient: float | History,
+        ambient: float | TimeFunction,
         *,
         name: str = "convection",
         corners: tuple[float, ...] = (),
@@ -169,7 +169,7 @@ class PrescribedTemperature:
         self,
         temperature: Temperature,
         entities: NDArray[np.int32],
-        value: float | History,
+        value: float | TimeFunction,
         *,
         name: str | None = None,
         dim: int | None = None,

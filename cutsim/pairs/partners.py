@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 from cutsim.base.assembly import box
 from cutsim.base.memory import Memory
 from cutsim.fields.points import DEGREE
+from cutsim.pairs.configuration import Pairs, Points
 from cutsim.pairs.outer_surface import Master, OuterSurface, normals
 from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, project
-from cutsim.pairs.points import Pairs, Points
 
 #: Degree of the quadrature on a slave surface, by that of the displacement: master facets end within a slave facet.
 DEGREES = {1: DEGREE, 2: 8}
@@ -73,13 +73,13 @@ class PairKinematics:
         name: Name of the slave surface.
         slave: The slave surface.
         master: The master surface.
-        fixed: Whether pairs are fixed.
+        small_sliding: Whether pairs are those of the reference configuration.
         search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
             come into it during a step, find theirs at any depth.
         size: Mean size of the slave facets [length].
 
     Attributes:
-        tables: Shape functions and derivatives at the points of a slave facet.
+        tables: FacetShape functions and derivatives at the points of a slave facet.
     """
 
     def __init__(
@@ -89,11 +89,11 @@ class PairKinematics:
         slave: OuterSurface,
         master: Master,
         *,
-        fixed: bool,
+        small_sliding: bool,
         search: float,
         size: float,
     ) -> None:
-        self.slave, self.master, self.fixed, self._search = slave, master, fixed, search
+        self.slave, self.master, self.small_sliding, self._search = slave, master, small_sliding, search
         shape = slave.shape.element
         places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
         self.tables = slave.shape.values(places)
@@ -105,10 +105,10 @@ class PairKinematics:
         self._known = memory.value(f"{name}: partners", _Known(slid, np.zeros(len(points.x), dtype=bool)))
         self._found = memory.value(f"{name}: search", self._look_around(points, nodes, search, 0))
         self._old_hits = self._hits(points, nodes)
-        if not fixed:
+        if not small_sliding:
             self._dig_out(points, nodes)
         self._offset = np.zeros_like(points.x)
-        if fixed:
+        if small_sliding:
             self._offset = self.pairs(nodes).jump
 
     def nodes(self, u: Array, *, start: bool = False) -> tuple[Array, Array]:
@@ -137,7 +137,7 @@ class PairKinematics:
     def begin(self, nodes: tuple[Array, Array]) -> None:
         """Take a configuration for the start of a step."""
         self._old, self._old_nodes = self._points(nodes[0]), nodes
-        if not self.fixed:
+        if not self.small_sliding:
             self._old_hits = self._hits(self._old, nodes)
 
     def note(self, pairs: Pairs) -> None:
@@ -158,12 +158,12 @@ class PairKinematics:
     def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
         """Points and partners for nodes of slave and master facets."""
         points = self._points(nodes[0])
-        hits = self._old_hits if self.fixed else self._hits(points, nodes)
+        hits = self._old_hits if self.small_sliding else self._hits(points, nodes)
         values, derivatives = self.master.shape.values(hits.xi)
         y = nodes[1][hits.facets]
         distance = np.einsum("nb,nbi->ni", values, y) - points.x[hits.points]
         tangents = np.einsum("nkb,nbi->nki", derivatives, y)
-        if self.fixed:
+        if self.small_sliding:
             jump, rate = self._fixed_jump(points, hits, distance), None
         else:
             jump, rate = self._sliding_jump(hits, values, derivatives)

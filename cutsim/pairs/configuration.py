@@ -46,7 +46,7 @@ class Points:
         """Derivative of the frames of some points with respect to the tangents.
 
         Returns:
-            Shape (rows, axes, dimension, directions, dimension).
+            FacetShape (rows, axes, dimension, directions, dimension).
         """
         dim = self.x.shape[-1]
         t, outward, frames = self.tangents[rows], self.normals[rows], self.frames[rows]
@@ -71,7 +71,7 @@ class Pairs:
     Attributes:
         slave: The slave points.
         hits: Their partners.
-        values: Shape functions of the master facets at the partners, shape (hits, nodes).
+        values: FacetShape functions of the master facets at the partners, shape (hits, nodes).
         derivatives: Their derivatives, shape (hits, directions, nodes).
         jump: Opening and slide of every point, shape (points, dimension) [length].
         slide_rate: Derivative of the jump by the reference coordinates at fixed frame, shape (hits, dimension,
@@ -127,7 +127,7 @@ class Pairs:
             master: Increments of the nodes of the master facets [length].
 
         Returns:
-            Shape (points, dimension), zero without partner.
+            FacetShape (points, dimension), zero without partner.
         """
         change = np.zeros_like(slave)
         points, facets = self.hits.points, self.hits.facets

@@ -28,7 +28,7 @@ class HeatTerm(Term):
 
 
 @dataclass(frozen=True)
-class HeatBalance:
+class HeatAudit:
     """Audit of heat since the start of a run [energy].
 
     Attributes:
@@ -40,7 +40,7 @@ class HeatBalance:
     entries: Mapping[str, float] = field(default_factory=lambda: dict.fromkeys((*GAINED, *SPENT), 0.0))
     scale: float = 0.0
 
-    def advance(self, heats: Iterable[Mapping[str, float]]) -> "HeatBalance":
+    def advance(self, heats: Iterable[Mapping[str, float]]) -> "HeatAudit":
         """Audit after a step.
 
         Args:

@@ -13,10 +13,10 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
-from cutsim.interface.law import respond
-from cutsim.interface.slip import SlipHistory, completed
+from cutsim.interface.modified_contact import respond
+from cutsim.interface.slip import SlipHistory
+from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.pairing import Array
-from cutsim.pairs.points import Pairs
 
 
 @dataclass(frozen=True)
@@ -26,16 +26,16 @@ class PairLaws:
     Args:
         cohesive: Cohesive law, None for a broken interface.
         contact: Contact law.
-        friction: Friction law, None for none; it acts on the broken fraction.
-        penetration: Largest mean penetration of a facet after augmentation [length]; None for no augmentation.
-        stick: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
+        friction: Friction law with a tangential penalty, None for none; it acts on the broken fraction.
+        allowed_penetration: Largest mean penetration of a facet after augmentation [length]; None for no augmentation.
+        allowed_slip: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
     """
 
     cohesive: CohesiveLaw | None
     contact: PenaltyContact
     friction: FrictionLaw | None
-    penetration: float | None
-    stick: float | None
+    allowed_penetration: float | None
+    allowed_slip: float | None
 
 
 class PairLaw:
@@ -77,12 +77,11 @@ class PairLaw:
         }
         self.slip: SlipHistory | None = None
         if laws.friction is not None:
-            friction = completed(laws.friction, laws.contact.stiffness)
-            share, stick = r.damage[1], laws.stick
+            share, stick = r.damage[1], laws.allowed_slip
             # how a point without partner comes near is not known
             depth = points.at(self._met) * r.penetration
             self.slip = SlipHistory(
-                state, name, points, friction, slide, r.pressure, depth, share=share, tolerance=stick
+                state, name, points, laws.friction, slide, r.pressure, depth, share=share, tolerance=stick
             )
             shear = [s + share * t for s, t in zip(shear, self.slip.traction, strict=True)]
         traction = ufl.as_vector([r.tension - r.pressure, *shear])
@@ -119,11 +118,11 @@ class PairLaw:
         The multiplier is one value a facet: at every point it would hold a facet in more places than it has nodes.
         """
         pressed = False
-        if self._laws.penetration is not None:
+        if self._laws.allowed_penetration is not None:
             pressure, met = self._values()["pressure"], self._points.get(self._met)
             # at an edge a facet is covered in part: points without partner are no part of the mean
             share = self._points.facet_mean(met)
             mean = np.divide(self._points.facet_mean(pressure), share, out=np.zeros_like(share), where=share > 0)
             mean = np.broadcast_to(mean[:, None], pressure.shape)
-            pressed = self._history.augment(mean, self._laws.contact.stiffness * self._laws.penetration)
+            pressed = self._history.augment(mean, self._laws.contact.stiffness * self._laws.allowed_penetration)
         return (self.slip is not None and self.slip.augment()) or pressed

@@ -1,4 +1,4 @@
-"""Measures of an iterate, reduced over all ranks for the judge of convergence."""
+"""Norms of an iterate, reduced over all ranks for the judge of convergence."""
 
 from math import sqrt
 
@@ -10,8 +10,8 @@ from cutsim.solvers.convergence import Iterate
 from cutsim.solvers.system import System
 
 
-class Measures:
-    """Measures of iterates and of the steps between them. Every method but `note_direction` is collective.
+class Norms:
+    """Norms of iterates and of the steps between them. Every method but `note_direction` is collective.
 
     Args:
         system: The equations.

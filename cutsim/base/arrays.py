@@ -1,0 +1,7 @@
+"""Types of arrays."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Array of numbers.
+Array = NDArray[np.float64]
