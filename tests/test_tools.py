@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cutsim.tools.pointed import Blade, Needle
-from cutsim.tools.shapes import Ball, FlatPunch, Path, Plane
+from cutsim.tools.shapes import Ball, FlatPunch, Plane, ToolPath
 from helpers.tools import values
 
 HALF, R, SHANK = 0.4, 0.3, 0.9  # half angle, tip radius, half thickness of the blade

@@ -6,7 +6,7 @@ import ufl
 
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import SmoothCoulomb
-from cutsim.tools.shapes import Path
+from cutsim.tools.shapes import ToolPath
 from cutsim.tools.tool_contact import ToolContact
 
 
@@ -31,7 +31,7 @@ FRICTION = SmoothCoulomb(0.3, 0.01)
 def touch(b, shape, place, surfaces, friction):
     """Contact with a tool that moved a little in the step."""
     before = np.array(place) + np.eye(len(place))[0] * 0.05
-    path = Path.polyline([0.0, 1.0], [before, place])
+    path = ToolPath.polyline([0.0, 1.0], [before, place])
     tool = ToolContact(b.state, shape, path, surfaces, contact=CONTACT, friction=friction)
     b.state.begin(1.0)
     tool.begin()
