@@ -59,10 +59,10 @@ from cutsim import (
     SurfacePair,
     TaggedMesh,
     ToolContact,
+    ToolPath,
     read_geo,
     run,
 )
-from cutsim import Path as ToolPath
 from cutsim.base.compat import geometry_nodes, nodal_expression
 from cutsim.fields.points import FacetPoints, Surface, Values
 from cutsim.results.output import claim_folder, write_summary

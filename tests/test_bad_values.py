@@ -30,7 +30,7 @@ def world():
     space = cutsim.cracked_space(b.state.mesh, ("Lagrange", 1), b.facets)
     temperature = cutsim.Temperature(b.state, space, 1.0)
     contact = cutsim.PenaltyContact(10.0)
-    path = cutsim.Path(lambda t: np.array([0.5, 2.0]))
+    path = cutsim.ToolPath(lambda t: np.array([0.5, 2.0]))
     crack, top = b.crack(), b.face(1, 1.0)
     surface = cutsim.Surface.exterior(b.state, top)
     tool = cutsim.ToolContact(b.state, cutsim.Ball(0.3), path, [surface], contact=contact)
