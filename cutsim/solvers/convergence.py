@@ -197,11 +197,11 @@ class Judge:
                 iterate.
             iterate: Its numbers.
         """
+        # far away the rounding level passes for convergence; where the solve starts is not its own fault
         if iteration > 0 and iterate.size > self.criteria.largest:
             return Reason.RUNAWAY
         self._size = max(self._size, iterate.size)
-        first = not self.residuals
-        if iteration > 0 or first:
+        if iteration > 0 or not self.residuals:
             self.residuals.append(iterate.free)
         self._rescale(iterate)
         required = self._required(iterate)
@@ -216,6 +216,7 @@ class Judge:
         return Reason.STALLED if self._stalls(iterate.free) else Reason.GOING_ON
 
     def _rescale(self, iterate: Iterate) -> None:
+        # a body on its way back to rest has hardly any reactions: what is small is told by those of the solve before
         self.force = max(iterate.reaction, self.residuals[0]) if self.criteria.by_start else iterate.reaction
         self.scale = max(self._before, self.force)
 
@@ -249,6 +250,7 @@ class Judge:
 
     def _stalls(self, free: float) -> bool:
         r = self.residuals
+        # one more iteration at a kink costs as much as any, and the next line search gets past it
         return not self._patient and len(r) > STALL and free > STALLED * r[-1 - STALL]
 
 

@@ -147,6 +147,7 @@ class Iterations:
         iterations = linear = 0
         while True:
             self.renew_tangent()
+            # SNES counts anew after each interruption, but the limit is one for the whole solve
             self.snes.setTolerances(max_it=self._max_it - iterations)
             self.snes.solve(None, self._x)
             iterations += self.snes.getIterationNumber()
@@ -181,6 +182,7 @@ class Iterations:
 
     def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:
         """Called by SNES after the linear solve: make the step of the constrained dofs exact."""
+        # the linear solver meets these rows within its tolerance only, and what is left would be lifted again
         forces = self._system.forces
         y.array[forces.held] = forces.violation(x.array_r)
         self._measures.note_direction(y.array_r, self.snes.getFunction()[0].array_r)

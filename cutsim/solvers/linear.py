@@ -57,7 +57,7 @@ class LinearSolver:
             return False
         was_fresh = self.preconditioner.fresh
         self.preconditioner.refresh()
-        if not was_fresh:
+        if not was_fresh:  # it was made for an older tangent; one made for this tangent may do
             return True
         fallback = self._fallback()
         if fallback is None:

@@ -70,6 +70,7 @@ def preset_for(
         "mg_levels_ksp_max_it": 1,
         "mg_levels_pc_type": "sor",
     }
+    # a tighter tolerance gains nothing: Newton's own error is larger until the last iteration
     if saddle_point:
         return Preset("saddle", _gmres(1e-4, 200), _schur(amg), patience=60)
     if has_interface:
@@ -92,6 +93,7 @@ def fallback_for(failed: Preset, n_dofs: int, symmetric: bool) -> Preset | None:
 
 
 def _direct(symmetric: bool) -> Preset:
+    # a factorisation of an older tangent is a preconditioner, too: a few iterations are cheaper than a new one
     return Preset("direct", _gmres(1e-6, 20), _factor(symmetric), patience=8)
 
 
@@ -229,6 +231,7 @@ class LaggedPC:
         Args:
             iterations: Krylov iterations it took.
         """
+        # how many iterations the best preconditioner of this kind needs depends on the problem: measure against it
         if self.fresh:
             self._limit = max(self._patience, 1.5 * iterations)
         self._stale = iterations > self._limit
@@ -302,6 +305,7 @@ class StripCycle(LaggedPC):
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Called by PETSc: one cycle from y = 0."""
+        # each part sees the residual that the one before it leaves; added up, they would correct the strip twice
         A = pc.getOperators()[0]
         y.set(0.0)
         self._correct_strip(x, y)
