@@ -6,20 +6,16 @@ face: T·n > 0 pulls them together.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 import ufl
-from dolfinx import default_scalar_type, fem
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
-from cutsim.base.functions import larger
-from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
-from cutsim.base.parameters import with_constants
+from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.crack_checks import check_cracked
@@ -29,33 +25,14 @@ from cutsim.fields.space import crack_measure_entities
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack_faces import CrackFaces
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.history import InterfaceHistory
-from cutsim.interface.modified_contact import Response, respond
 
 #: Fields of a crack for output.
 FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
 # pressure over that of faces which look at each other that counts as none
 _ROUNDING = 1e-9
-
-
-@dataclass(frozen=True)
-class CrackResponse(Response):
-    """Response of a crack at a displacement: kinematics and tractions.
-
-    Attributes:
-        jump: Displacement jump δ = u⁻ − u⁺ [length].
-        opening: δ·n [length].
-        slide: Tangential part of the jump, a vector [length].
-        cohesive: Cohesive traction on the '+' face, a vector [stress].
-        normal: Unit normal of the mid-surface, from '+' to '−'.
-    """
-
-    jump: Expr
-    opening: Expr
-    slide: Expr
-    cohesive: Expr
-    normal: Expr
 
 
 class Crack(Term):
@@ -76,6 +53,7 @@ class Crack(Term):
         young: Young's modulus of the softer neighbour [stress].
         points: Its integration points, with the facets in the order of all per-facet arrays.
         history: What they remember.
+        faces: Kinematics and tractions of the faces at a displacement.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
         size: Mean size of the facets along the crack, their shortest edge [length].
         normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
@@ -103,7 +81,6 @@ class Crack(Term):
         require_number("young", young, positive)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
         self.name, self.state, self.law, self.young = name, state, law, young
-        self._current = normal == "current"
         self._allowed_penetration = allowed_penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
         check_cracked(state.V, facets, name)
@@ -113,13 +90,13 @@ class Crack(Term):
         self.size = self.points.mean(facet_size(state.mesh, self.points.facets))
         self.normal_size = self.points.mean(normal_size(state.mesh, self.points.facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
-        self._symbolic_law = None if law is None else with_constants(state.mesh, law)
-        self._symbolic_contact = with_constants(state.mesh, self.contact)
         if law is not None:
             doubt_law(state.verdict, name, law, young, self.size)
-        self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
         self.history = InterfaceHistory(state.memory, name, self.points, law)
-        self._point_values = self.points.evaluator(self._columns())
+        augmented = allowed_penetration is not None
+        self.faces = CrackFaces(
+            state, self.points, self.history, law, self.contact, current=normal == "current", augmented=augmented
+        )
 
     # -- virtual work ---------------------------------------------------------------------------------------------
 
@@ -154,54 +131,21 @@ class Crack(Term):
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ T·(v⁻ − v⁺) dΓ₀ of cohesive traction and contact pressure."""
-        response = self.response(self.state.u)
+        response = self.faces.response(self.state.u)
         traction = response.cohesive - response.pressure * response.normal
         return ufl.inner(traction, displacement_jump(v)) * self.points.measure
 
-    def response(self, u: Expr) -> CrackResponse:
-        """The law at a displacement, restricted to the crack."""
-        N = ufl.FacetNormal(self.state.mesh)
-        n = midsurface_normal(u, N) if self._current else N("+")
-        jump = displacement_jump(u)
-        gap = ufl.dot(jump, n)
-        slide = jump - gap * n
-        multiplier = self.points.at(self.history.multiplier) if self._allowed_penetration else 0.0
-        fade = facing(u, N) if self._current else ufl.as_ufl(1.0)
-        memory = self.points.at(self.history.secants)
-        r = respond(self._symbolic_law, self._symbolic_contact, gap, slide, memory, multiplier, fade)
-        return CrackResponse(**vars(r), jump=jump, opening=gap, slide=slide, cohesive=r.tension * n + r.shear, normal=n)
-
     # -- history --------------------------------------------------------------------------------------------------
-
-    def _columns(self) -> dict[str, Expr]:
-        """What is known at each point, at the fraction s of the step's displacement increment."""
-        u_s = self.state.u_old + self._s * (self.state.u - self.state.u_old)
-        r = self.response(u_s)
-        increment = displacement_jump(self.state.u) - displacement_jump(self.state.u_old)
-        return {
-            "secants": ufl.as_vector([*r.secants]),
-            "jump": ufl.as_vector([r.opening, *(ufl.dot(r.jump, a) for a in self.frame(u_s))]),
-            "contact_power": -r.pressure * ufl.dot(r.normal, increment),
-            "stored": 0.5 * ufl.dot(r.cohesive, r.jump),
-            "damage": larger(*r.damage),
-            "opening": r.opening,
-            "sliding": r.sliding,
-            "pressure": r.pressure,
-        }
-
-    def _evaluate_at(self, s: float) -> dict[str, Values]:
-        self._s.value = s
-        return self._point_values()
 
     def evaluate(self) -> None:
         """Trial history, and the work of the step integrated along the path of the displacement. Collective."""
-        self.history.evaluate(self._evaluate_at)
+        self.history.evaluate(self.faces.values)
 
     def augment(self) -> bool:
         """Uzawa step λ ← p (thesis 4.33) if a closed point is off by more than is allowed. Collective."""
         if self._allowed_penetration is None:
             return False
-        pressure = self._evaluate_at(1.0)["pressure"]
+        pressure = self.faces.values(1.0)["pressure"]
         return self.history.augment(pressure, self.contact.stiffness * self._allowed_penetration)
 
     def energies(self) -> dict[str, float]:
@@ -214,7 +158,7 @@ class Crack(Term):
 
     def diagnose(self) -> str | None:
         """Say where the trial state of the last solve opens or closes most. Collective."""
-        values = self._evaluate_at(1.0)
+        values = self.faces.values(1.0)
         opening, penetration = self.points.maximum(values["opening"]), self._penetration(values)
         return f"{self.name}: largest opening {opening:.3g}, largest penetration {penetration:.3g}"
 
@@ -266,7 +210,3 @@ class Crack(Term):
     def facet_mean(self, name: str) -> Values:
         """Mean over each local crack facet of a point quantity; arguments as `point_values`."""
         return self.points.facet_mean(self.point_values(name))
-
-    def frame(self, u: Expr) -> tuple[Expr, ...]:
-        """Unit tangents of the mid-surface that turn with it: one in 2-D, two in 3-D."""
-        return surface_frame(u, self.state.mesh, self.response(u).normal, current=self._current)

@@ -13,7 +13,7 @@ from cutsim.fields.points import Values
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import SlipHistory, completed
+from cutsim.interface.slip import Rubbing, SlipHistory, completed
 
 
 class CrackFriction(Term):
@@ -56,22 +56,19 @@ class CrackFriction(Term):
             crack.state.verdict.doubt(f"{crack.name}: friction", words)
         self.crack, self.name = crack, f"{crack.name}_friction"
         u = crack.state.u
-        response, self._frame = crack.response(u), crack.frame(u)
+        response, self._frame = crack.faces.response(u), crack.faces.frame(u)
         tension = ufl.dot(response.cohesive, response.normal) if acts_on == "tension" else 0.0
         hotter = None if temperature is None else ufl.max_value(temperature.value("+"), temperature.value("-"))
         self._share = response.damage[1] if acts_on == "broken" else ufl.as_ufl(1.0)
-        self.slip = SlipHistory(
-            crack.state,
-            self.name,
-            crack.points,
-            completed("law", law, crack.contact.stiffness),
+        rubbing = Rubbing(
             ufl.as_vector([ufl.dot(response.jump, a) for a in self._frame]),
             response.pressure + tension,
             ufl.as_ufl(0.0) if acts_on == "tension" else response.penetration,
             share=self._share,
-            tolerance=allowed_slip,
             temperature=hotter,
         )
+        friction = completed("law", law, crack.contact.stiffness)
+        self.slip = SlipHistory(crack.state, self.name, crack.points, friction, rubbing, tolerance=allowed_slip)
 
     @property
     def entity_maps(self) -> EntityMaps:

@@ -1,7 +1,7 @@
 """Slip history at integration points: anchor, traction and dissipation of friction (docs/theory.md §3.3)."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import ufl
@@ -43,13 +43,45 @@ def _closed(before: Expr, now: Expr) -> Expr:
     return ufl.conditional(ufl.lt(before, 0), depth / (depth - before), 1.0)
 
 
+@dataclass(frozen=True)
+class Rubbing:
+    """What rubs at the points of a surface, as expressions of the displacement.
+
+    Attributes:
+        slip: Slip s, a vector of components in a frame that turns with the surface [length].
+        pressure: Contact pressure [stress].
+        penetration: Penetration δ that goes with the pressure, negative while the point is open [length].
+        share: Fraction of the area on which friction acts, in [0, 1].
+        project: Projection of a slip to the tangential plane, if the frame is not tangential by itself.
+        temperature: Temperature of the hotter side, for laws that need it.
+    """
+
+    slip: Expr
+    pressure: Expr
+    penetration: Expr
+    share: Expr = 1.0
+    project: Callable[[Expr], Expr] = lambda slip: slip
+    temperature: Expr | None = None
+
+    def slid(self, start: Expr, carried: Expr, before: Expr) -> tuple[Expr, Expr, Expr]:
+        """Slide of the step, its fraction after closure, and the slip that the law resists.
+
+        Args:
+            start: Slip at the start of the step.
+            carried: Elastic slip at that time.
+            before: Penetration at that time.
+        """
+        closed = _closed(before, self.penetration)
+        slid = self.project(self.slip - start)
+        return slid, closed, closed * slid + self.project(carried)
+
+
 class SlipHistory:
     """Friction state at the points of a surface, for any kinematics.
 
-    The slip is a vector s of components in a frame that turns with the surface.  The memory is the slip s₀ at the start
-    of the step and the elastic slip e that carries a traction; the trial traction is ε_T (f (s − s₀) + e).  After a
-    step e = t/ε_T.  Augmentation (Simo and Laursen 1992) raises e within a step until facets that stick do so within a
-    tolerance.
+    The memory is the slip s₀ at the start of the step and the elastic slip e that carries a traction; the trial
+    traction is ε_T (f (s − s₀) + e).  After a step e = t/ε_T.  Augmentation (Simo and Laursen 1992) raises e within a
+    step until facets that stick do so within a tolerance.
 
     A point that closes within a step rubs from there on: with the penetration δ, negative while it is open,
     f = δ/(δ − δ₀) is the fraction of the step after closure on a straight path, and 1 if it was closed before.  So the
@@ -60,13 +92,8 @@ class SlipHistory:
         name: Name of the surface.
         points: Integration points.
         law: Friction law with a tangential penalty.
-        slip: Slip s, a vector [length].
-        pressure: Contact pressure [stress].
-        penetration: Penetration δ that goes with the pressure, negative while the point is open [length].
-        share: Fraction of the area on which friction acts, in [0, 1].
-        project: Projection of a slip to the tangential plane, if the frame is not tangential by itself.
+        rubbing: Slip and pressure.
         tolerance: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
-        temperature: Temperature of the hotter side, for laws that need it.
 
     Attributes:
         traction: Traction along the slip, on the whole area, in the frame of the slip [stress].
@@ -78,34 +105,31 @@ class SlipHistory:
         name: str,
         points: FacetPoints,
         law: FrictionLaw,
-        slip: Expr,
-        pressure: Expr,
-        penetration: Expr,
+        rubbing: Rubbing,
         *,
-        share: Expr = 1.0,
-        project: Callable[[Expr], Expr] = lambda slip: slip,
         tolerance: float | None = None,
-        temperature: Expr | None = None,
     ) -> None:
         self.points, self._tolerance, self._compliance = points, tolerance, law.compliance
         # augmentation leaves no elastic slip that energy is stored in
         self._elastic = law.compliance if tolerance is None else 0.0
         symbolic: FrictionLaw = with_constants(state.mesh, law)
-        self._memory = points.function(2 * len(slip) + 1)
-        slid, closed, since = self._slide(slip, penetration, project)
-        self.traction = symbolic.traction(since, pressure, state.dt, temperature)
+        n = len(rubbing.slip)
+        self._memory = points.function(2 * n + 1)
+        memory = [points.at(self._memory)[i] for i in range(2 * n + 1)]
+        slid, closed, since = rubbing.slid(ufl.as_vector(memory[:n]), ufl.as_vector(memory[n:-1]), memory[-1])
+        self.traction = symbolic.traction(since, rubbing.pressure, state.dt, rubbing.temperature)
         size, resistance = (ufl.sqrt(ufl.dot(w, w)) for w in (since, self.traction))
         self._evaluate = points.evaluator(
             {
-                "slip": slip,
+                "slip": rubbing.slip,
                 "slid": slid,
-                "penetration": penetration,
+                "penetration": rubbing.penetration,
                 "closed": closed,
                 "traction": self.traction,
                 "advance": size - symbolic.compliance * resistance if law.compliance else size,
-                "limit": symbolic.limit(pressure, temperature),
-                "pressure": pressure,
-                "share": ufl.as_ufl(share),
+                "limit": symbolic.limit(rubbing.pressure, rubbing.temperature),
+                "pressure": rubbing.pressure,
+                "share": ufl.as_ufl(rubbing.share),
             }
         )
         start = self._evaluate()
@@ -114,14 +138,6 @@ class SlipHistory:
         values = {**start, **flat, "traction": np.zeros_like(start["traction"])}
         self._known = state.memory.value(f"{name}: slip", values, lambda known: self._start_from(known["traction"]))
         self._start_from(values["traction"])
-
-    def _slide(self, slip: Expr, penetration: Expr, project: Callable[[Expr], Expr]) -> tuple[Expr, Expr, Expr]:
-        """Slide of the step, its fraction after closure, and the slip that the law resists."""
-        n = len(slip)
-        memory = [self.points.at(self._memory)[i] for i in range(2 * n + 1)]
-        closed = _closed(memory[-1], penetration)
-        slid = project(slip - ufl.as_vector(memory[:n]))
-        return slid, closed, closed * slid + project(ufl.as_vector(memory[n:-1]))
 
     def evaluate(self) -> None:
         """Slip, dissipation and stored energy of the trial step. Collective.

@@ -14,7 +14,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.modified_contact import respond
-from cutsim.interface.slip import SlipHistory
+from cutsim.interface.slip import Rubbing, SlipHistory
 from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.pairing import Array
 
@@ -77,12 +77,11 @@ class PairLaw:
         }
         self.slip: SlipHistory | None = None
         if laws.friction is not None:
-            share, stick = r.damage[1], laws.allowed_slip
+            share = r.damage[1]
             # how a point without partner comes near is not known
             depth = points.at(self._met) * r.penetration
-            self.slip = SlipHistory(
-                state, name, points, laws.friction, slide, r.pressure, depth, share=share, tolerance=stick
-            )
+            rubbing = Rubbing(slide, r.pressure, depth, share=share)
+            self.slip = SlipHistory(state, name, points, laws.friction, rubbing, tolerance=laws.allowed_slip)
             shear = [s + share * t for s, t in zip(shear, self.slip.traction, strict=True)]
         traction = ufl.as_vector([r.tension - r.pressure, *shear])
         stiffness = ufl.diff(traction, jump)

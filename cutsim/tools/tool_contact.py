@@ -20,7 +20,7 @@ from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import SlipHistory, completed
+from cutsim.interface.slip import Rubbing, SlipHistory, completed
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import Shape, ToolPath, check_directions
@@ -70,17 +70,14 @@ class Patch:
         self._facing = ufl.dot(surface.restrict(_outward(state)), normal)
         self.slip: SlipHistory | None = None
         if friction is not None:
-            self.slip = SlipHistory(
-                state,
-                name,
-                surface.points,
-                friction,
+            rubbing = Rubbing(
                 surface.restrict(state.u) - position,
                 self._pressure,
                 self._penetration,
                 project=lambda slip: tangential(slip, normal),
                 temperature=None if temperature is None else surface.restrict(temperature.value),
             )
+            self.slip = SlipHistory(state, name, surface.points, friction, rubbing)
 
     def virtual_work(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ (t − p ∇d)·v: pressure and friction as they act on the tool."""
