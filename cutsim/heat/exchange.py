@@ -10,8 +10,10 @@ from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 from cutsim.base.log import collective_logger
 from cutsim.base.parameters import with_constants
+from cutsim.base.terms import Columns
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.temperature import Temperature
+from cutsim.heat.audit import HeatTerm
 from cutsim.heat.contact_heat import HeatLaw
 
 logger = collective_logger(__name__)
@@ -161,17 +163,43 @@ class HeatExchange:
         return self.values[name]
 
 
-def contact_columns(name: str, exchanges: Sequence[HeatExchange]) -> dict[str, tuple[float, str]]:
-    """Columns of the history for the contact of two surfaces, see `cutsim.base.terms.Term.record`. Collective.
+class ExchangeTerm(HeatTerm):
+    """Heat exchange between surfaces, whatever they are."""
 
-    Args:
-        name: Name in the columns.
-        exchanges: All exchanges between the surfaces.
-    """
-    hottest = max(e.points.maximum(e.values["temperature"]) for e in exchanges)
-    least = min(e.least_dissipation() for e in exchanges)
-    return {
-        f"{name}_temperature_max": (hottest, "temperature"),
-        f"{name}_contact_dissipation_min": (least, "flux"),
-        f"{name}_entropy": (sum(e.entropy for e in exchanges), "entropy"),
-    }
+    @property
+    def exchanges(self) -> Sequence[HeatExchange]:
+        """What is known of heat at the points of each surface."""
+        raise NotImplementedError
+
+    @property
+    def entity_maps(self) -> EntityMaps:
+        """Maps from facets of the mesh to the points of the surfaces."""
+        return {mesh: cells for e in self.exchanges for mesh, cells in e.entity_maps.items()}
+
+    def evaluate(self) -> None:
+        """Fluxes, interface temperature and entropy of the trial step. Collective."""
+        for exchange in self.exchanges:
+            exchange.evaluate()
+
+    def heat(self) -> dict[str, float]:
+        """Heat generated and stored by the interface in the step. Collective."""
+        heats = [e.heat() for e in self.exchanges]
+        return {entry: sum(heat[entry] for heat in heats) for entry in heats[0]}
+
+    def flow(self, side: str) -> float:
+        """Heat flow out of a surface, side "plus" or "minus" [power]. Collective."""
+        return sum(e.flow(side) for e in self.exchanges)
+
+    def flows(self) -> Columns:
+        """Columns of the heat flows out of both surfaces. Collective."""
+        return {f"{self.name}_heat_flow_{side}": (self.flow(side), "power") for side in ("plus", "minus")}
+
+    def record(self) -> Columns:
+        """Heat flows, highest interface temperature, least contact dissipation, entropy. Collective."""
+        hottest = max(e.points.maximum(e.values["temperature"]) for e in self.exchanges)
+        least = min(e.least_dissipation() for e in self.exchanges)
+        return self.flows() | {
+            f"{self.name}_temperature_max": (hottest, "temperature"),
+            f"{self.name}_contact_dissipation_min": (least, "flux"),
+            f"{self.name}_entropy": (sum(e.entropy for e in self.exchanges), "entropy"),
+        }

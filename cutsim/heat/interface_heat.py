@@ -8,14 +8,12 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim.base.checks import require
-from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.fields.points import Values
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.audit import HeatTerm
 from cutsim.heat.contact_heat import ContactHeat
-from cutsim.heat.exchange import HeatExchange, contact_columns
+from cutsim.heat.exchange import ExchangeTerm, HeatExchange
 from cutsim.interface.crack import Crack
 
 
@@ -26,7 +24,7 @@ class Friction(Protocol):
         """Friction dissipation of the trial step per reference area at the crack's points [energy/area]."""
 
 
-class InterfaceHeat(HeatTerm):
+class InterfaceHeat(ExchangeTerm):
     """Heat exchange across a crack, heated by friction and fracture.
 
     Pressure and dissipation are those of the mechanical step, per reference area.
@@ -63,9 +61,9 @@ class InterfaceHeat(HeatTerm):
         self.exchange = HeatExchange(temperature, crack.points, law, T("+"), T("-"), self.name)
 
     @property
-    def entity_maps(self) -> EntityMaps:
-        """Map from facets of the mesh to the crack's points."""
-        return self.exchange.entity_maps
+    def exchanges(self) -> tuple[HeatExchange, ...]:
+        """What is known of heat at the points of the crack."""
+        return (self.exchange,)
 
     def residual(self, w: Expr) -> ufl.Form:
         """Heat that leaves the bodies through the faces."""
@@ -80,22 +78,6 @@ class InterfaceHeat(HeatTerm):
             nothing if self.friction is None else self.friction.dissipation(),
             self.law.fracture_fraction * self.crack.dissipation(),
         )
-
-    def evaluate(self) -> None:
-        """Fluxes, interface temperature and entropy of the trial step. Collective."""
-        self.exchange.evaluate()
-
-    def heat(self) -> dict[str, float]:
-        """Heat generated and stored by the interface in the step. Collective."""
-        return self.exchange.heat()
-
-    def record(self) -> dict[str, tuple[float, str]]:
-        """Heat flow out of '+' and '−', highest interface temperature, contact dissipation, entropy. Collective."""
-        flows = {
-            f"{self.name}_heat_flow_plus": (self.exchange.flow("plus"), "power"),
-            f"{self.name}_heat_flow_minus": (self.exchange.flow("minus"), "power"),
-        }
-        return flows | contact_columns(self.name, [self.exchange])
 
 
 def _is_cracked(V: fem.FunctionSpace, crack: Crack) -> bool:

@@ -9,14 +9,13 @@ from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.audit import HeatTerm
 from cutsim.heat.contact_heat import ContactHeat
-from cutsim.heat.exchange import contact_columns
+from cutsim.heat.exchange import ExchangeTerm, HeatExchange
 from cutsim.heat.heat_pass import HeatPass
 from cutsim.pairs.surface_pair import SurfacePair
 
 
-class PairHeat(HeatTerm):
+class PairHeat(ExchangeTerm):
     """Heat exchange across a pair of surfaces, heated by their friction and fracture.
 
     Pressure, partners and dissipation are those of the mechanical step, per reference area of the slave.  The interface
@@ -67,17 +66,12 @@ class PairHeat(HeatTerm):
         for p in self.passes:
             p.evaluate()
 
-    def heat(self) -> dict[str, float]:
-        """Heat generated and stored by the interface in the step. Collective."""
-        heats = [p.exchange.heat() for p in self.passes]
-        return {entry: sum(heat[entry] for heat in heats) for entry in heats[0]}
+    @property
+    def exchanges(self) -> Sequence[HeatExchange]:
+        """What is known of heat at the points of each pass."""
+        return [p.exchange for p in self.passes]
 
     def flow(self, side: str) -> float:
         """Heat flow out of a surface, side "plus" (slave) or "minus" (master) [power]. Collective."""
         sides = (side, {"plus": "minus", "minus": "plus"}[side])
         return sum(p.exchange.flow(s) for p, s in zip(self.passes, sides, strict=False))
-
-    def record(self) -> dict[str, tuple[float, str]]:
-        """Heat flow out of slave and master, highest temperature, contact dissipation, entropy. Collective."""
-        flows = {f"{self.name}_heat_flow_{side}": (self.flow(side), "power") for side in ("plus", "minus")}
-        return flows | contact_columns(self.name, [p.exchange for p in self.passes])

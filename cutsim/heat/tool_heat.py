@@ -1,21 +1,22 @@
 """Heat between a rigid tool and the body that it touches (docs/theory.md §3.4)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import ufl
 
 from cutsim.base.checks import require
-from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import Schedule, TimeFunction
 from cutsim.base.signatures import checked
+from cutsim.base.terms import Columns
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.audit import HeatTerm
 from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
-from cutsim.heat.exchange import HeatExchange, contact_columns
+from cutsim.heat.exchange import ExchangeTerm, HeatExchange
 from cutsim.tools.tool_contact import ToolContact
 
 
-class ToolHeat(HeatTerm):
+class ToolHeat(ExchangeTerm):
     """Heat exchange with a rigid tool, heated by its friction.
 
     Args:
@@ -26,9 +27,6 @@ class ToolHeat(HeatTerm):
         tool_temperature: Temperature of the tool, a number or a function of time [temperature]; not for an adiabatic
             tool.
         name: Name in messages and output; by default that of the tool.
-
-    Attributes:
-        exchanges: What is known of heat at the points of each surface the tool can touch.
 
     Raises:
         ValueError: The law has a capacity, or the tool's temperature is missing, superfluous or below absolute zero.
@@ -55,7 +53,7 @@ class ToolHeat(HeatTerm):
             else Schedule(self.state.mesh, self.state.memory, tool_temperature, "tool_temperature", self.name)
         )
         self._check()
-        self.exchanges = [
+        self._exchanges = [
             HeatExchange(temperature, patch.surface.points, law, body, self._opposite(body), self.name)
             for patch in tool.patches
             for body in [patch.surface.restrict(temperature.value)]
@@ -69,9 +67,9 @@ class ToolHeat(HeatTerm):
             self.temperature.check("tool_temperature", self._tool_temperature.value)
 
     @property
-    def entity_maps(self) -> EntityMaps:
-        """Maps from facets of the mesh to the points of the surfaces."""
-        return {mesh: cells for e in self.exchanges for mesh, cells in e.entity_maps.items()}
+    def exchanges(self) -> Sequence[HeatExchange]:
+        """What is known of heat at the points of each surface the tool can touch."""
+        return self._exchanges
 
     def residual(self, w: Expr) -> ufl.Form:
         """Heat that leaves the body through the surfaces."""
@@ -90,21 +88,15 @@ class ToolHeat(HeatTerm):
         for exchange, patch in zip(self.exchanges, self.tool.patches, strict=True):
             exchange.begin(patch.pressure(), patch.dissipation(), np.zeros_like(exchange.points.weights))
 
-    def evaluate(self) -> None:
-        """Fluxes, temperature and entropy at the contact in the trial step. Collective."""
-        for exchange in self.exchanges:
-            exchange.evaluate()
-
     def heat_flow(self) -> float:
         """Heat that flows into the tool [power]. Collective."""
-        return -sum(e.flow("minus") for e in self.exchanges)
+        return -self.flow("minus")
 
     def heat(self) -> dict[str, float]:
         """Heat from friction, and heat that left into the tool, in the step. Collective."""
-        friction = sum(e.heat()["friction"] for e in self.exchanges)
+        friction = super().heat()["friction"]
         return {"friction": friction, "outflow": self.heat_flow() * float(self.state.dt.value)}
 
-    def record(self) -> dict[str, tuple[float, str]]:
-        """Heat flow into the tool, highest temperature, contact dissipation and entropy at the contact. Collective."""
-        flow = {f"{self.name}_heat_flow": (self.heat_flow(), "power")}
-        return flow | contact_columns(self.name, self.exchanges)
+    def flows(self) -> Columns:
+        """Column of the heat flow into the tool. Collective."""
+        return {f"{self.name}_heat_flow": (self.heat_flow(), "power")}
