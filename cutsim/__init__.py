@@ -35,6 +35,10 @@ from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.results.output import read_history
+from cutsim.results.pictures import draw_body
+from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.recording import Recording
 from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.body import CrackedBody, cracked_block
 from cutsim.studies.drive import Drive
@@ -63,6 +67,7 @@ __all__ = [
     "Crack",
     "CrackFriction",
     "CrackedBody",
+    "Curve",
     "DispersedFibres",
     "Drive",
     "EllipsoidalFibres",
@@ -96,6 +101,7 @@ __all__ = [
     "PrescribedTemperature",
     "Pressure",
     "Prony",
+    "Recording",
     "Reinforced",
     "SmoothCoulomb",
     "Solid",
@@ -123,10 +129,14 @@ __all__ = [
     "Yeoh",
     "cracked_block",
     "cracked_space",
+    "draw_body",
     "geometry",
     "laminate",
     "piecewise_direction",
+    "plot_curves",
+    "plot_energy",
     "read_geo",
+    "read_history",
     "read_msh",
     "run",
     "tag_mesh",

@@ -181,6 +181,8 @@ EXAMPLES |= {
 
 #: Made by others, not from numbers of a user.
 MADE = {"CohesiveLaw", "CrackedBody", "FrictionLaw", "Insertion", "LayeredBlock", "Material", "StepError", "StepReport"}
+#: What shows results, after all was computed.
+SHOWN = {"Curve", "Recording", "draw_body", "plot_curves", "plot_energy", "read_history"}
 #: Where infinity says that there is no limit.
 ENDLESS = {("run", "until")}
 #: What takes files and curves, beside what is in `cutsim` itself.
@@ -196,7 +198,7 @@ def callables():
     found = {}
     for name in cutsim.__all__:
         item = getattr(cutsim, name)
-        if name not in MADE:
+        if name not in MADE | SHOWN:
             found[name] = item
         if inspect.isclass(item):
             methods = (n for c in item.__mro__ for n, m in vars(c).items() if isinstance(m, classmethod))
