@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import Interrupted, StepControl, StepError, run
+from cutsim.base.memory import Memory
 from cutsim.base.verdict import Verdict
 from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
@@ -119,7 +120,7 @@ def test_numbers_that_do_not_go_together(law, young, words):
 
 
 def test_a_tool_of_another_size_than_the_body():
-    verdict = Verdict()
+    verdict = Verdict(Memory())
     doubt_units(verdict, "ball", Ball(0.2), body=2.0)
     assert verdict.trusted
     doubt_units(verdict, "ball", Ball(5.0), body=2.0)
@@ -127,7 +128,7 @@ def test_a_tool_of_another_size_than_the_body():
 
 
 def test_the_worst_is_kept_and_said_once(caplog):
-    verdict = Verdict()
+    verdict = Verdict(Memory())
     for size in (1.0, 3.0, 2.0):
         verdict.doubt("closure", f"{size} missing", size)
     assert verdict.reasons == ("3.0 missing",) and [r.message for r in caplog.records] == ["1.0 missing"]

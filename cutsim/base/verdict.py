@@ -1,6 +1,7 @@
 """Verdict on a result: whether it can be trusted, and the reasons against it."""
 
 from cutsim.base.log import collective_logger
+from cutsim.base.memory import Memory
 
 logger = collective_logger(__name__)
 
@@ -13,11 +14,15 @@ class Verdict:
 
     Whoever sees something wrong says so in words: this is warned of once, when it is first seen, and the worst case is
     kept.  Every rank has to say the same.
+
+    Args:
+        memory: Memory of the run, which keeps the reasons whether or not a step is accepted.
     """
 
-    def __init__(self) -> None:
-        self._reasons: dict[str, tuple[float, str]] = {}
-        self._pending: dict[str, str] = {}
+    def __init__(self, memory: Memory) -> None:
+        none: dict[str, tuple[float, str]] = {}
+        self._reasons = memory.value("verdict: reasons", none)
+        self._pending = memory.value("verdict: pending", dict[str, str]())
         self._warned: set[str] = set()
 
     def doubt(self, kind: str, words: str, measure: float = 0.0) -> None:
@@ -29,9 +34,9 @@ class Verdict:
             measure: How bad it is; of one kind the worst is kept.
         """
         self._warn(kind, words)
-        known = self._reasons.get(kind)
+        known = self._reasons.committed.get(kind)
         if known is None or measure > known[0]:
-            self._reasons[kind] = measure, words
+            self._reasons.set(self._reasons.committed | {kind: (measure, words)})
 
     def suppose(self, kind: str, words: str, *, aloud: bool = False) -> None:
         """Say what makes the result questionable unless it is withdrawn before the end.
@@ -43,11 +48,11 @@ class Verdict:
         """
         if aloud:
             self._warn(kind, words)
-        self._pending[kind] = words
+        self._pending.set(self._pending.committed | {kind: words})
 
     def withdraw(self, kind: str) -> None:
         """Take back what was supposed; nothing happens if nothing was."""
-        self._pending.pop(kind, None)
+        self._pending.set({k: words for k, words in self._pending.committed.items() if k != kind})
 
     def _warn(self, kind: str, words: str) -> None:
         if kind not in self._warned:
@@ -57,7 +62,7 @@ class Verdict:
     @property
     def reasons(self) -> tuple[str, ...]:
         """What speaks against the result, in the order in which it was seen."""
-        return (*(words for _, words in self._reasons.values()), *self._pending.values())
+        return (*(words for _, words in self._reasons.committed.values()), *self._pending.committed.values())
 
     @property
     def trusted(self) -> bool:
