@@ -68,7 +68,7 @@
 # leaves it free to be compressed only.  This is what the closed forms need; the slab's modulus then does nothing, and
 # that of the block only says how far it is pressed in.  In *steel* both are elastic, the top of the block is moved and
 # the bottom of the slab held; pressed in as far as in *column*, it bears half the load, and its front and rear edges
-# press most.  All strokes are shorter than an element, for which a contact of fixed pairs of facets is made.
+# press most.  All strokes are shorter than an element, for which contact with small sliding is made.
 
 import logging
 from collections.abc import Callable

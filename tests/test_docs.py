@@ -1,11 +1,16 @@
 """The pages say what the code does: their Python runs, and their examples pass the tests of what they extend."""
 
+import importlib
+import pkgutil
+import re
 from dataclasses import replace
+from functools import reduce
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+import cutsim
 from cutsim.fields.points import Surface
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
@@ -203,6 +208,28 @@ def test_step_control():
     assert control.next(replace(reports[1], refusal="too large")) == reports[1].dt / 2
     with pytest.raises(ValueError, match="smallest = 1"):
         page["Aimed"](first=0.1, largest=0.5, smallest=1.0)
+
+
+def resolves(name):
+    """Whether a dotted name is a module of the package or something in one."""
+    parts = name.split(".")
+    for i in range(len(parts), 0, -1):
+        try:
+            found = importlib.import_module(".".join(parts[:i]))
+        except ModuleNotFoundError:
+            continue
+        return reduce(lambda thing, part: getattr(thing, part, None), parts[i:], found) is not None
+    return False
+
+
+def test_names_on_the_pages_exist():
+    """Modules, classes and functions that the pages mention by their dotted names."""
+    packages = "|".join(m.name for m in pkgutil.iter_modules(cutsim.__path__))
+    pattern = re.compile(rf"`(?:cutsim\.)?((?:{packages})\.[\w.]+(?<!\.bp))`")
+    texts = {path.name: path.read_text(encoding="utf-8") for path in [*DOCS.glob("*.md"), DOCS.parent / "README.md"]}
+    names = {(page, name) for page, text in texts.items() for name in pattern.findall(text)}
+    assert len(names) > 50
+    assert not {f"{page}: {name}" for page, name in names if not resolves(f"cutsim.{name}")}
 
 
 def test_page_of_the_api_is_up_to_date(monkeypatch):

@@ -164,7 +164,7 @@ class HeatExchange:
 
 
 class ExchangeTerm(HeatTerm):
-    """Heat exchange between surfaces, whatever they are."""
+    """Heat exchange between two surfaces of any kind."""
 
     @property
     def exchanges(self) -> Sequence[HeatExchange]:

@@ -139,7 +139,7 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
 
 @runtime_checkable
 class Storing(Protocol):
-    """A term that gives unknowns their heat capacity.
+    """Protocol of a term that gives unknowns their heat capacity.
 
     Attributes:
         dofs: Local dofs of the temperature that it has.

@@ -36,7 +36,7 @@ class CrackResponse(Response):
 
 
 class CrackFaces:
-    """The interface law between the faces of a crack, at any displacement.
+    """Interface law between the faces of a crack, at any displacement.
 
     Args:
         state: Displacement and time.

@@ -39,7 +39,7 @@ Along = Callable[[float], dict[str, Values]]
 
 @dataclass(frozen=True)
 class _Known:
-    """What is known at the points at the end of a step.
+    """Data of the points at the end of a step.
 
     Attributes:
         values: Values by name, see `Along`.

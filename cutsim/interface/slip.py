@@ -45,7 +45,7 @@ def _closed(before: Expr, now: Expr) -> Expr:
 
 @dataclass(frozen=True)
 class Rubbing:
-    """What rubs at the points of a surface, as expressions of the displacement.
+    """Slip and pressure at the points of a surface, as expressions of the displacement.
 
     Attributes:
         slip: Slip s, a vector of components in a frame that turns with the surface [length].

@@ -28,7 +28,7 @@ WILD = 1e9
 
 @dataclass(frozen=True)
 class _Known:
-    """What is known of the points at the end of a step.
+    """Data of the points at the end of a step.
 
     Attributes:
         slid: Slide so far [length].
@@ -43,7 +43,7 @@ class _Known:
 
 @dataclass(frozen=True)
 class _Search:
-    """The last search for facets that are near each other.
+    """Last search for facets that are near each other.
 
     Attributes:
         near: Slave and master facets.

@@ -60,7 +60,7 @@ class RigidSurface:
 
 
 class _Touch(SurfacePass):
-    """The points of a body against a rigid surface, which has no nodes: the pattern never changes."""
+    """Points of a body against a rigid surface, which has no nodes: the sparsity pattern never changes."""
 
     @property
     def pattern(self) -> int:
