@@ -2,7 +2,7 @@
 # DOLFINX=wheel|system and PYTHON=/path/to/python3 choose what it takes; docs/install.md says how.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-mpi bench lint api docs dist clean always
+.PHONY: help setup demo validation test test-mpi bench lint api docs dist clean always
 
 NAME ?= blade
 JOBS ?= $(shell nproc)
@@ -10,9 +10,13 @@ STAMP := .venv/.setup-stamp
 DOCS_STAMP := .venv/.docs-stamp
 PYTHON_IN_VENV := .venv/bin/python
 RUN := scripts/run $(if $(RANKS),-n $(RANKS))
+REDUCED := $(if $(filter-out 0,$(QUICK)),--quick)
+LESSON := $(wildcard demos/demo_$(NAME).py)
+PROGRAM := tests/validation/$(NAME).py
+names = $$(ls $(1) | sed -n 's/^$(2)\(.*\)\.py$$/\1/p')
 
 help: ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 # The script sees for itself whether .venv is whole and up to date, and then leaves the stamp alone.
 $(STAMP): always
@@ -20,10 +24,15 @@ $(STAMP): always
 
 setup: $(STAMP) ## install what is missing
 
-demo: $(STAMP) ## run demos/demo_NAME.py: NAME=blade RANKS=2 QUICK=1 ARGS="--friction .1"; writes results/NAME
-	@test -f demos/demo_$(NAME).py || { echo "no demo '$(NAME)'; there are:" \
-	    $$(ls demos | sed -n 's/^demo_\(.*\)\.py$$/\1/p') >&2; exit 2; }
-	$(RUN) demos/demo_$(NAME).py $(if $(filter-out 0,$(QUICK)),--quick) $(ARGS)
+demo: $(STAMP) ## run the lesson NAME, or else the validation program: NAME=blade RANKS=2 QUICK=1; writes results/NAME
+	@test -f $(or $(LESSON),$(PROGRAM)) || { echo "no demo '$(NAME)'; there are:" $(call names,demos,demo_) \
+	    "and the validation programs" $(call names,tests/validation) >&2; exit 2; }
+	$(if $(and $(LESSON),$(ARGS)),@echo "a lesson has no options: edit $(LESSON), or see make validation" >&2; exit 2)
+	$(RUN) $(or $(LESSON),$(PROGRAM) --out results/$(NAME)) $(REDUCED) $(ARGS)
+
+validation: $(STAMP) ## run a validation program: NAME=blade QUICK=1 ARGS="--friction .1"; writes results/validation/NAME
+	@test -f $(PROGRAM) || { echo "no validation program '$(NAME)'; there are:" $(call names,tests/validation) >&2; exit 2; }
+	$(RUN) $(PROGRAM) $(REDUCED) $(ARGS)
 
 test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those marked mpi on 2 and 3 ranks
 	scripts/run -n 1 -m pytest -n $(JOBS) --dist loadfile tests $(ARGS)

@@ -36,8 +36,8 @@ from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.results.output import read_history
-from cutsim.results.pictures import draw_body
-from cutsim.results.plots import Curve, plot_curves, plot_energy
+from cutsim.results.pictures import draw_body, draw_stress
+from cutsim.results.plots import Curve, plot_curves, plot_energy, plot_parts
 from cutsim.results.recording import Recording
 from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.body import CrackedBody, cracked_block
@@ -45,6 +45,7 @@ from cutsim.studies.drive import Drive
 from cutsim.studies.fixture import Fixture
 from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock
+from cutsim.studies.picture import draw_insertion
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
@@ -130,11 +131,14 @@ __all__ = [
     "cracked_block",
     "cracked_space",
     "draw_body",
+    "draw_insertion",
+    "draw_stress",
     "geometry",
     "laminate",
     "piecewise_direction",
     "plot_curves",
     "plot_energy",
+    "plot_parts",
     "read_geo",
     "read_history",
     "read_msh",

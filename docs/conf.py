@@ -1,4 +1,4 @@
-"""Sphinx: Markdown pages, the demos as rendered scripts (not run), and the API from its docstrings."""
+"""Sphinx: Markdown pages, lessons and validation programs (rendered, not run), and the API from its docstrings."""
 
 import re
 import sys
@@ -25,7 +25,7 @@ extensions = [
 ]
 exclude_patterns = ["_build", "*.py", "figures", "**/__pycache__", "**/.ipynb_checkpoints"]
 
-# demos/ is linked into this folder; its light scripts are read as notebooks and shown without running them
+# demos/ and tests/validation/ are linked into this folder; their light scripts are shown as notebooks without running
 nb_custom_formats = {".py": "demo_reader.read"}
 nb_execution_mode = "off"
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]

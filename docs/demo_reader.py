@@ -1,4 +1,4 @@
-"""Demos as notebooks: Sphinx does not know the language of a script without a header."""
+"""Lessons and validation programs as notebooks: Sphinx does not know the language of a script without a header."""
 
 import jupytext
 import nbformat

@@ -13,7 +13,7 @@ from cutsim.results.recording import Recording
 assert Path(cutsim.__file__).is_relative_to(sys.prefix), f"{cutsim.__file__} is not installed in {sys.prefix}"
 
 silicone = NeoHookean(young=0.777, poisson=0.45)
-bond = Exponential.from_parameters(strength=0.6, toughness=0.5)
+bond = Exponential(strength=0.6, toughness=0.5)
 size = {"dim": 2, "Lx": 4, "H": 6, "lc": 0.1, "band": 0.4}
 mesh = read_geo(geometry("block"), MPI.COMM_WORLD, size, gdim=2)
 blade = Blade(half_angle=0.2, tip_radius=0.1, half_thickness=0.855)

@@ -1,8 +1,6 @@
 """Contact against closed forms: balls and cylinders, stick and slip, a wedge on a slope, a bond of unlike meshes."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,10 +17,8 @@ from cutsim.materials.elastic import LinearElastic
 from cutsim.pairs.surface_pair import SurfacePair
 from helpers.boxes import stack
 from helpers.runs import history
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-from demo_dcb import ISOTROPIC, control
-from demo_hertz import CYLINDER, FULL, MINDLIN, QUICK, Indentation, LineContact, indent
+from validation.dcb import ISOTROPIC, control
+from validation.hertz import CYLINDER, FULL, MINDLIN, QUICK, Indentation, LineContact, indent
 
 # -- balls ------------------------------------------------------------------------------------------------------------
 

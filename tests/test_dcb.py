@@ -1,17 +1,13 @@
 """Double cantilever beam: beam theory, energy spent on broken area, unloading, ranks, and steps that fail."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from cutsim.analysis.stepping import run
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-from demo_dcb import ISOTROPIC, QUICK, THESIS, Beam, control, growth, secants
+from validation.dcb import ISOTROPIC, QUICK, THESIS, Beam, control, growth, secants
 
 SMALL = replace(THESIS, length=70.0, openings=(0.0, 0.14, 0.02, 0.18), step=0.02, size=2.0, fine=30.0)
 

@@ -1,8 +1,6 @@
 """End-notched flexure: closed forms and their energy balance, growth in shear, and what friction takes."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +9,7 @@ from mpi4py import MPI
 from cutsim.analysis.stepping import run
 from cutsim.fields.meshing import read_geo
 from cutsim.studies.fracture import EndNotchedBeam, crack_profile
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-from demo_enf import MESH, QUICK, Beam, before_growth, control, growth
+from validation.enf import MESH, QUICK, Beam, before_growth, control, growth
 
 MU = 0.5
 SIMPLE = EndNotchedBeam(height=3.0, thickness=2.0, half_span=60.0, modulus=200e3)

@@ -1,8 +1,6 @@
 """A block rubbed on a slab: closed forms, conservation of heat, temperatures of the faces, and the geometry."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +11,7 @@ from cutsim.fields.meshing import read_geo
 from cutsim.fields.sizes import facet_size, global_range, normal_size
 from cutsim.heat.contact_heat import ContactHeat
 from cutsim.interface.friction import Coulomb
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-from demo_frictional_heating import (
+from validation.frictional_heating import (
     AREA,
     COLUMN,
     MESH,

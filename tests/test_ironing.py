@@ -1,17 +1,12 @@
 """Ironing: forces on a die that is drawn along a slab with another mesh are smooth, and their work is accounted for."""
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 from cutsim.analysis.stepping import run
 from cutsim.fields.meshing import read_geo
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-from demo_ironing import CONTROL, MESH, Bodies, Ironing, columns, forces
+from validation.ironing import CONTROL, MESH, Bodies, Ironing, columns, forces
 
 MU = 0.3
 

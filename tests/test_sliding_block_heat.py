@@ -1,8 +1,6 @@
 """A block that slides on a slab: its hot spot against closed forms, and the balance of heat."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,9 +8,7 @@ from mpi4py import MPI
 
 from cutsim.analysis.stepping import run
 from cutsim.fields.meshing import read_geo
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
-from demo_sliding_block_heat import (
+from validation.sliding_block_heat import (
     BLOCK,
     HEIGHT,
     INSULATOR,

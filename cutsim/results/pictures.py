@@ -15,12 +15,16 @@ from typing import TYPE_CHECKING, Any
 
 import basix
 import numpy as np
+import ufl
 from dolfinx import fem, plot
 from dolfinx.mesh import Mesh
 from mpi4py import MPI
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cutsim.base.checks import require
+from cutsim.bodies.solid import Solid
+from cutsim.interface.crack import Crack
+from cutsim.results.output import interpolate
 
 if TYPE_CHECKING:
     import pyvista
@@ -91,9 +95,9 @@ def gather_facets(
 
 def prism(
     outline: NDArray[np.float64],
-    origin: Sequence[float],
-    axes: tuple[Sequence[float], Sequence[float]],
-    edge: Sequence[float] | None = None,
+    origin: ArrayLike,
+    axes: tuple[ArrayLike, ArrayLike],
+    edge: ArrayLike | None = None,
 ) -> pyvista.PolyData | None:
     """A tool of constant cross-section, for `draw_body`.
 
@@ -109,7 +113,8 @@ def prism(
     pyvista = _library("no tool is drawn")
     if pyvista is None:
         return None
-    first, second, start = (np.pad(np.asarray(v, dtype=float), (0, 3 - len(v))) for v in (*axes, origin))
+    vectors = (np.asarray(v, dtype=float) for v in (*axes, origin))
+    first, second, start = (np.pad(v, (0, 3 - len(v))) for v in vectors)
     points = start + outline[:, :1] * first + outline[:, 1:] * second
     face = pyvista.PolyData(points, faces=[len(points), *range(len(points))])
     return face if edge is None else face.extrude(np.asarray(edge, dtype=float), capping=True)
@@ -117,8 +122,8 @@ def prism(
 
 def revolved(
     outline: NDArray[np.float64],
-    origin: Sequence[float],
-    axes: tuple[Sequence[float], Sequence[float]],
+    origin: ArrayLike,
+    axes: tuple[ArrayLike, ArrayLike],
     points: int = 48,
 ) -> pyvista.PolyData | None:
     """A tool of revolution in space, for `draw_body`.
@@ -205,6 +210,24 @@ def draw_body(
         plotter.close()
     except Exception as error:  # a picture is never worth a run
         logger.warning("%s was not drawn: %s", path, error)
+
+
+def draw_stress(path: Path | str, solid: Solid, crack: Crack | None = None, **view: Any) -> None:
+    """Draw the deformed body coloured by von Mises' stress, and a crack by its damage. Collective.
+
+    Args:
+        path: The PNG, 1600 × 1000; folders are made.
+        solid: The body.
+        crack: A crack of it with a cohesive law.
+        view: Further arguments of `draw_body`; the label is that of stresses in MPa by default.
+    """
+    u = solid.state.u
+    deviator = ufl.dev(solid.cauchy_stress(u))
+    stress = fem.Function(fem.functionspace(solid.state.mesh, ("DG", 0)))
+    interpolate(stress, ufl.sqrt(1.5 * ufl.inner(deviator, deviator)))
+    faces = None if crack is None else gather_facets(u, crack.points.facets, crack.facet_mean("damage"))
+    view = {"label": "von Mises stress [MPa]", **view}
+    draw_body(path, gather_grid(u, {"stress": stress}), "stress", crack=faces, **view)
 
 
 def _library(otherwise: str) -> Any:

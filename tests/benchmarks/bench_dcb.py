@@ -14,8 +14,8 @@ from mpi4py import MPI
 
 from cutsim import StepReport, run
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "demos"))
-from demo_dcb import ISOTROPIC, Beam, control, growth
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from validation.dcb import ISOTROPIC, Beam, control, growth
 
 COMM = MPI.COMM_WORLD
 STEPS = 100

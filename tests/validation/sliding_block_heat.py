@@ -36,11 +36,11 @@
 #
 # ## What is computed
 #
-# Plane strain, per millimetre of width.  *thesis* (K. Bronik): Tables 4.4 and 4.8, read as in the demo of frictional
-# heating, now with the whole distance of 60 mm: $E$ = 5.1 MPa, $\nu$ = 0.48, $\mu$ = 0.1, $\varepsilon_T$ = 0.1
-# MPa/mm, $k$ = 100 mW/(mm K), $\gamma^\pm$ = 1000 mW/(N K), $C_c$ = 100 mJ/(mm² K), $c$ = 10⁸ mJ/(t K), density 1
-# t/m³, 1 mm/s, 0.1 MPa.  An interface of that capacity stays with the block and keeps 90 % of the heat, and the slab
-# conducts so well that no spot is seen.
+# Plane strain, per millimetre of width.  *thesis* (K. Bronik): Tables 4.4 and 4.8, read as in the program
+# `frictional_heating`, now with the whole distance of 60 mm: $E$ = 5.1 MPa, $\nu$ = 0.48, $\mu$ = 0.1,
+# $\varepsilon_T$ = 0.1 MPa/mm, $k$ = 100 mW/(mm K), $\gamma^\pm$ = 1000 mW/(N K), $C_c$ = 100 mJ/(mm² K),
+# $c$ = 10⁸ mJ/(t K), density 1 t/m³, 1 mm/s, 0.1 MPa.  An interface of that capacity stays with the block and keeps
+# 90 % of the heat, and the slab conducts so well that no spot is seen.
 #
 # *insulator*: steel under 100 MPa at 10 mm/s, the block taking no heat, which theory has in closed form.  In both the
 # slab is fixed at every node, which makes the pressure uniform: its modulus does nothing.  *steel*:
@@ -77,6 +77,7 @@ from cutsim import (
     TaggedMesh,
     Temperature,
     ThermoMechanics,
+    geometry,
     read_geo,
     run,
 )
@@ -86,7 +87,7 @@ from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Columns, Recording
 
-MESH = Path(__file__).parents[1] / "meshes" / "sliding.geo"
+MESH = geometry("sliding")
 COMM = MPI.COMM_WORLD
 BLOCK, SLAB, HEIGHT = 10.0, 100.0, 10.0  # lengths of block and slab, height of each [mm]
 START, SLIDE = 15.0, 60.0  # rear edge of the block at first, and its way [mm]
@@ -504,7 +505,7 @@ def check(results: dict[str, dict[str, float]]) -> None:
 
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="coarser, with larger steps")] = False,
-    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/sliding_block_heat"),
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/sliding_block_heat"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Slide a block over a slab and compare the hot spot with closed forms."""

@@ -87,7 +87,7 @@ def main(
     depth: Annotated[float | None, typer.Option(help="depth of the cut in mm")] = None,
     stretch: Annotated[float, typer.Option(min=0.0, help="stretch of the skin before the cut")] = STRETCH,
     quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
-    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/skin_layers"),
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/skin_layers"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Cut through the eight layers of skin."""

@@ -60,6 +60,7 @@ from cutsim import (
     TaggedMesh,
     ToolContact,
     ToolPath,
+    geometry,
     read_geo,
     run,
 )
@@ -70,7 +71,6 @@ from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Columns, Recording
 
-MESHES = Path(__file__).parents[1] / "meshes"
 COMM = MPI.COMM_WORLD
 
 # ## A ball on a block
@@ -110,7 +110,7 @@ class Specimen:
     def mesh(self, cells: int, upper: int, comm: MPI.Comm) -> TaggedMesh:
         """One or two blocks with so many cells along their cores."""
         parameters = dict(L=self.size, c=self.core, n=cells, n_upper=upper, growth=self.growth, order=2 if upper else 1)
-        return read_geo(MESHES / "half_spaces.geo", comm, parameters)
+        return read_geo(geometry("half_spaces"), comm, parameters)
 
     def supports(self, domain: TaggedMesh, state: State) -> list[Support]:
         """Planes of symmetry, and the bottom held."""
@@ -300,7 +300,7 @@ class LineContact:
     def build(cls, lines: Lines, comm: MPI.Comm = COMM) -> "LineContact":
         """Mesh the bodies and put the terms together."""
         shape = dict(R=lines.radius, R_lower=lines.lower_radius, band=lines.band, lc=lines.size, lc_far=lines.far)
-        domain = read_geo(MESHES / "cylinders.geo", comm, shape, gdim=2)
+        domain = read_geo(geometry("cylinders"), comm, shape, gdim=2)
         state = State(fem.functionspace(domain.mesh, ("Lagrange", 2, (2,))))
         solids = [
             Solid(state, material, cells=domain.cells(name), name=name)
@@ -480,7 +480,7 @@ def check(results: dict[str, dict[str, float]], *, quick: bool) -> None:
 
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="coarser, in fewer steps")] = False,
-    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/hertz"),
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/hertz"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Press balls and cylinders on each other: a rigid ball, two bodies, two cylinders that are drawn sideways."""

@@ -30,6 +30,7 @@ from cutsim import (
     StepControl,
     TaggedMesh,
     cracked_block,
+    geometry,
     read_geo,
     run,
 )
@@ -47,7 +48,7 @@ from cutsim.materials.library import material
 from cutsim.results.output import write_summary
 from cutsim.results.plots import Curve, plot_curves
 
-MESH = Path(__file__).parents[1] / "meshes" / "block.geo"
+MESH = geometry("block")
 COMM = MPI.COMM_WORLD
 AREA, LENGTH = 10.1 * 4.2, 60.0  # of the specimen in tension [mm², mm]
 
@@ -214,7 +215,7 @@ def toughness_of(number: int, specimen: Specimen, domain: TaggedMesh) -> tuple[d
 
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="shorter cut, first silicone only")] = False,
-    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/identify_silicone"),
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/identify_silicone"),
 ) -> None:
     """Identify modulus, Poisson's ratio, toughness and friction of silicones."""
     logging.basicConfig(level=logging.ERROR, format="%(name)s: %(message)s")

@@ -57,6 +57,7 @@ from cutsim import (
     StepControl,
     Support,
     cracked_space,
+    geometry,
     read_geo,
     run,
 )
@@ -75,7 +76,7 @@ from cutsim.studies.fracture import (
     plane_modulus,
 )
 
-MESH = Path(__file__).parents[1] / "meshes" / "enf.geo"
+MESH = geometry("enf")
 COMM = MPI.COMM_WORLD
 
 
@@ -361,7 +362,7 @@ def main(
         list[float] | None, typer.Option(min=0.0, help="friction coefficient; give it several times to compare")
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="coarser, in fewer steps")] = False,
-    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/enf"),
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/enf"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Bend an end-notched beam till its crack grows in shear, without and with friction (0, 0.3 and 0.5)."""

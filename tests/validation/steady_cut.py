@@ -38,13 +38,13 @@ import numpy as np
 import typer
 from mpi4py import MPI
 
-from cutsim import Blade, Drive, Exponential, Insertion, NeoHookean, StepControl, cracked_block, read_geo, run
+from cutsim import Blade, Drive, Exponential, Insertion, NeoHookean, StepControl, cracked_block, geometry, read_geo, run
 from cutsim.results.output import claim_folder, write_summary
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Recording
 from cutsim.studies.insertion_work import SteadyCut, TwoInsertions, steady_force
 
-MESH = Path(__file__).parent.parent / "meshes" / "block.geo"
+MESH = geometry("block")
 
 # ## The strip
 #
@@ -110,7 +110,7 @@ History = dict[str, np.ndarray]
 
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="coarser meshes")] = False,
-    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/steady_cut"),
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/steady_cut"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Split strips, twice each, in plane strain and in space: what force and front say of the toughness."""

@@ -35,14 +35,26 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim import Coulomb, Mechanics, NeoHookean, Solid, State, StepControl, Support, SurfacePair, read_geo, run
+from cutsim import (
+    Coulomb,
+    Mechanics,
+    NeoHookean,
+    Solid,
+    State,
+    StepControl,
+    Support,
+    SurfacePair,
+    geometry,
+    read_geo,
+    run,
+)
 from cutsim.base.compat import nodal_expression
 from cutsim.results.output import claim_folder, write_summary
 from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Columns, Recording
 
-MESH = Path(__file__).parents[1] / "meshes" / "ironing.geo"
+MESH = geometry("ironing")
 COMM = MPI.COMM_WORLD
 SLAB, DIE = NeoHookean(1.0, 0.3), NeoHookean(1000.0, 0.3)  # [MPa]
 RADIUS, HALF_CHORD = 2.0, 1.2  # of the die's face [mm]
@@ -230,7 +242,7 @@ def check(results: dict[str, dict[str, float]], sizes: tuple[float, ...]) -> Non
 
 def main(
     quick: Annotated[bool, typer.Option("--quick", help="without the finest mesh, a shorter way")] = False,
-    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/ironing"),
+    out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/ironing"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
 ) -> None:
     """Press a die into a slab, draw it along, and see how smooth the forces are."""
