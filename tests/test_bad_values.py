@@ -182,7 +182,8 @@ EXAMPLES |= {
 #: Made by others, not from numbers of a user.
 MADE = {"CohesiveLaw", "CrackedBody", "FrictionLaw", "Insertion", "LayeredBlock", "Material", "StepError", "StepReport"}
 #: What shows results, after all was computed.
-SHOWN = {"Curve", "Recording", "draw_body", "plot_curves", "plot_energy", "read_history"}
+SHOWN = {"Curve", "Recording", "read_history"}
+SHOWN |= {"draw_body", "draw_insertion", "draw_stress", "plot_curves", "plot_energy", "plot_parts"}
 #: Where infinity says that there is no limit.
 ENDLESS = {("run", "until")}
 #: What takes files and curves, beside what is in `cutsim` itself.
