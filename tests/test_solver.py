@@ -292,8 +292,11 @@ def test_a_problem_that_takes_over_what_another_has_kept_goes_on_like_it(monkeyp
         first.problem.preconditioner.refresh(pattern=True)
         second.problem.kept = kept = first.problem.kept
         assert second.problem.kept == kept == Kept(kept.force, "bt", "bulk") and kept.force > 0.0
-        outcome = unloaded(first)
-        assert outcome == unloaded(second) != unloaded(third)
+        outcomes = [unloaded(block) for block in (first, second, third)]
+        starts = [outcome.residuals[0] for outcome in outcomes]
+        assert starts[0] == pytest.approx(starts[1], rel=1e-9) and starts[2] > 1.1 * starts[0]
+        if WORLD.size == 1:  # several ranks add in the order in which messages arrive
+            assert outcomes[0] == outcomes[1]
     with block("failing_", bulk_pc_type="none", ksp_max_it=3) as first, block("other_") as second:
         first.top.value[1] = second.top.value[1] = 0.2
         assert first.problem.solve().converged and first.problem.kept.linear_solver == "direct"
