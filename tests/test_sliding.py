@@ -374,7 +374,7 @@ def memory(mechanics, pair):
     for p in pair.passes:
         arrays += [p.history.secants.x.array, p.history.multiplier.x.array, *p.history.trial.values()]
         arrays += [p.slip.values(name) for name in ("slip", "traction", "dissipated")]
-        arrays.append(p.kinematics._known.trial.slid)
+        arrays.append(p.kinematics._slid.trial)
     return [np.array(a) for a in arrays]
 
 

@@ -233,7 +233,7 @@ def test_rollback():
         arrays += [
             *tool.touch.history.trial.values(),
             list(tool.energies().values()),
-            tool.touch.kinematics._known.trial.slid,
+            tool.touch.kinematics._slid.trial,
         ]
         arrays += [tool.touch.slip.values(name) for name in ("slip", "traction", "dissipated")]
         return [np.array(a) for a in arrays]

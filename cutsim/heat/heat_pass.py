@@ -123,7 +123,8 @@ class HeatPass:
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.base.terms.Assembler.add_pattern`."""
-        near = [facets[self._slave.owned[self.contact.kinematics.near[0]]] for facets in self.contact.kinematics.near]
+        facets = self.contact.kinematics.partners.facets
+        near = [f[self._slave.owned[facets[0]]] for f in facets]
         own = self._slave.global_nodes
         facing = np.hstack([own[near[0]], self._master.global_nodes[near[1]]])
         for nodes in (own[self._slave.owned], facing):

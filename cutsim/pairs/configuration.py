@@ -71,7 +71,7 @@ class Pairs:
     Attributes:
         slave: The slave points.
         hits: Their partners.
-        values: FacetShape functions of the master facets at the partners, shape (hits, nodes).
+        values: Shape functions of the master facets at the partners, shape (hits, nodes).
         derivatives: Their derivatives, shape (hits, directions, nodes).
         jump: Opening and slide of every point, shape (points, dimension) [length].
         slide_rate: Derivative of the jump by the reference coordinates at fixed frame, shape (hits, dimension,

@@ -37,7 +37,7 @@ class FacetShape:
         return np.asarray(basix.geometry(self.element.cell_type).mean(axis=0))
 
     def values(self, xi: Array) -> tuple[Array, Array]:
-        """FacetShape functions, shape (n, nodes), and their derivatives, shape (n, directions, nodes), at n points."""
+        """Shape functions, shape (n, nodes), and their derivatives, shape (n, directions, nodes), at n points."""
         # one more point, because there may be none and basix aborts then
         tables = self.element.tabulate(1, np.vstack([xi, self.centre]))[:, :-1, :, 0]
         return tables[0], np.moveaxis(tables[1:], 0, 1)

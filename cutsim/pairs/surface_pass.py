@@ -162,7 +162,7 @@ class SurfacePass:
     @property
     def pattern(self) -> int:
         """Number of the sparsity pattern."""
-        return self.kinematics.version
+        return self.kinematics.partners.version
 
     def prepare(self) -> None:
         """Nothing: partners are found when forces are asked for."""
@@ -194,7 +194,7 @@ class SurfacePass:
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.base.terms.Assembler.add_pattern`."""
-        dofs = self.dofs(self.kinematics.near_nodes())
+        dofs = self.dofs(self.kinematics.partners.nodes())
         for some in np.array_split(dofs, 1 + len(dofs) // _CHUNK):
             add_blocks(A, some, np.zeros((*some.shape, some.shape[1])))
 
