@@ -77,15 +77,12 @@ class Recording:
         self.history: dict[str, list[float]] = {}
         self._stack = ExitStack()
         self._table: HistoryWriter | None = None
-        self._facets = [_FacetFields(t) for t in offering(problem.terms, FacetShowing) if t.facet_fields]
         comm, start = problem.state.mesh.comm, problem.state.time_old
         self._progress = self._stack.enter_context(Progress(until, comm, title, start=start))
         self._written = problem.state.memory.value(f"recording: {title}", _Written())
-        self._fields: FieldWriter | None = None
+        self._fields: _FieldFiles | None = None
         if every:
-            surfaces = {f.term.name: f.functions for f in self._facets}
-            derived = {**problem.fields, **(derived or {})}
-            self._fields = self._stack.enter_context(FieldWriter(self.folder, problem.state.u, derived, surfaces))
+            self._fields = _FieldFiles(self.folder, problem, derived or {}, self._stack)
 
     def __call__(self, report: StepReport) -> None:
         """Record an accepted step. Collective."""
@@ -113,8 +110,6 @@ class Recording:
     def write_fields(self, time: float) -> None:
         """Write the fields of the present state. Collective."""
         self._written.set(replace(self._written.committed, pending=None))
-        for facets in self._facets:
-            facets.update()
         if self._fields is not None:
             self._fields.write(time)
 
@@ -167,6 +162,22 @@ class Recording:
         if together or state.mesh.comm.rank == 0:
             write_summary(self.folder / "summary.json", self._summary(), summary)
         self._progress.say(f"{self._title}: {state.verdict}")
+
+
+class _FieldFiles:
+    """Files with the fields of a problem, those of its facets among them; collective."""
+
+    def __init__(self, folder: Path, problem: Problem, derived: Mapping[str, Expr], stack: ExitStack) -> None:
+        self._facets = [_FacetFields(t) for t in offering(problem.terms, FacetShowing) if t.facet_fields]
+        surfaces = {facets.term.name: facets.functions for facets in self._facets}
+        writer = FieldWriter(folder, problem.state.u, {**problem.fields, **derived}, surfaces)
+        self._writer = stack.enter_context(writer)
+
+    def write(self, time: float) -> None:
+        """Write the present state."""
+        for facets in self._facets:
+            facets.update()
+        self._writer.write(time)
 
 
 class _FacetFields:
