@@ -27,7 +27,8 @@ setup: $(STAMP) ## install what is missing
 demo: $(STAMP) ## run the lesson NAME, or else the validation program: NAME=blade RANKS=2 QUICK=1; writes results/NAME
 	@test -f $(or $(LESSON),$(PROGRAM)) || { echo "no demo '$(NAME)'; there are:" $(call names,demos,demo_) \
 	    "and the validation programs" $(call names,tests/validation) >&2; exit 2; }
-	$(if $(and $(LESSON),$(ARGS)),@echo "a lesson has no options: edit $(LESSON), or see make validation" >&2; exit 2)
+	@test -z '$(and $(LESSON),$(strip $(ARGS)))' || \
+	    { echo "a lesson has no options: edit $(LESSON), or see make validation" >&2; exit 2; }
 	$(RUN) $(or $(LESSON),$(PROGRAM) --out results/$(NAME)) $(REDUCED) $(ARGS)
 
 validation: $(STAMP) ## run a validation program: NAME=blade QUICK=1 ARGS="--friction .1"; writes results/validation/NAME

@@ -32,8 +32,9 @@ folder, comm = Path("results/own_mesh"), MPI.COMM_WORLD
 #
 # The plane between the strips is a line *inside* the mesh, with a single set of nodes: do not double them.  Everything
 # that the simulation speaks of gets a physical group with a name: the two strips, the line with and without glue, and
-# the grips.  In 3-D nothing changes but the dimensions: the plane is then a surface inside the volumes.  Only one rank
-# draws.
+# the grips.  The nodes may be fine where the strips are glued, and coarse elsewhere.  Only one rank draws.
+#
+# In 3-D nothing changes but the dimensions: the plane is then a surface inside the volumes.
 
 if comm.rank == 0:
     gmsh.initialize()
@@ -58,8 +59,8 @@ comm.barrier()
 
 # ## Read and crack it
 #
-# All ranks read the file.  On the cracked space the nodes of both lines have a displacement for each strip.  Triangles
-# need the degree 2, because rubber hardly changes its volume.
+# All ranks read the file; `domain.names` then lists the groups that it has.  On the cracked space the nodes of both
+# lines have a displacement for each strip.  Triangles need the degree 2, because rubber hardly changes its volume.
 
 from cutsim import State, cracked_space, read_msh
 

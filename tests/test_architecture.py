@@ -3,6 +3,7 @@
 import ast
 import inspect
 import pkgutil
+import re
 from dataclasses import is_dataclass
 from graphlib import TopologicalSorter
 from importlib import import_module
@@ -54,3 +55,19 @@ def test_materials_are_frozen_dataclasses():
             if kind.__module__ == f"cutsim.materials.{module.name}":
                 frozen = is_dataclass(kind) and kind.__dataclass_params__.frozen
                 assert frozen or "__init__" not in vars(kind) or getattr(kind, "_is_protocol", False), name
+
+
+LESSONS = sorted((Path(__file__).parents[1] / "demos").glob("*.py"))
+
+
+@pytest.mark.parametrize("path", LESSONS, ids=[path.stem for path in LESSONS])
+def test_lessons_are_read_from_top_to_bottom(path):
+    """At most 120 lines, a third of them prose, which comes first; no program with options, classes or a main."""
+    text = path.read_text(encoding="utf-8")
+    lines = text.splitlines()
+    assert path.stem.startswith("demo_") and lines[0].startswith("# # ")
+    assert len(lines) <= 120
+    assert 3 * sum(line.startswith("#") for line in lines) >= len(lines)
+    assert "$$" in text[: text.index("\nimport ")], "mathematics first"
+    assert not re.search(r"__main__|^class |argparse|typer", text, re.MULTILINE)
+    assert "overwrite=True" in text and "\nassert " in text, "a lesson can be run again, and checks its headline"

@@ -22,9 +22,9 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.compat import nodal_expression
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
-from cutsim.results.output import interpolate
 
 if TYPE_CHECKING:
     import pyvista
@@ -212,22 +212,36 @@ def draw_body(
         logger.warning("%s was not drawn: %s", path, error)
 
 
-def draw_stress(path: Path | str, solid: Solid, crack: Crack | None = None, **view: Any) -> None:
+def von_mises(solids: Sequence[Solid]) -> fem.Function:
+    """Von Mises' stress of some solids in the middle of their cells, zero elsewhere [stress]. Collective.
+
+    Args:
+        solids: The solids, one or more, of one mesh.
+    """
+    state = solids[0].state
+    stress = fem.Function(fem.functionspace(state.mesh, ("DG", 0)))
+    for solid in solids:
+        deviator = ufl.dev(solid.cauchy_stress(state.u))
+        size = nodal_expression(ufl.sqrt(1.5 * ufl.inner(deviator, deviator)), stress.function_space)
+        stress.interpolate(size, solid.cells)
+    stress.x.scatter_forward()
+    return stress
+
+
+def draw_stress(path: Path | str, solids: Solid | Sequence[Solid], crack: Crack | None = None, **view: Any) -> None:
     """Draw the deformed body coloured by von Mises' stress, and a crack by its damage. Collective.
 
     Args:
         path: The PNG, 1600 × 1000; folders are made.
-        solid: The body.
+        solids: The body, in one part or several.
         crack: A crack of it with a cohesive law.
         view: Further arguments of `draw_body`; the label is that of stresses in MPa by default.
     """
-    u = solid.state.u
-    deviator = ufl.dev(solid.cauchy_stress(u))
-    stress = fem.Function(fem.functionspace(solid.state.mesh, ("DG", 0)))
-    interpolate(stress, ufl.sqrt(1.5 * ufl.inner(deviator, deviator)))
+    solids = [solids] if isinstance(solids, Solid) else solids
+    u = solids[0].state.u
     faces = None if crack is None else gather_facets(u, crack.points.facets, crack.facet_mean("damage"))
-    view = {"label": "von Mises stress [MPa]", **view}
-    draw_body(path, gather_grid(u, {"stress": stress}), "stress", crack=faces, **view)
+    grid = gather_grid(u, {"stress": von_mises(solids)})
+    draw_body(path, grid, "stress", crack=faces, **{"label": "von Mises stress [MPa]", **view})
 
 
 def _library(otherwise: str) -> Any:

@@ -22,11 +22,11 @@ def draw_insertion(path: Path | str, cut: Insertion, **view: Any) -> None:
 
     Args:
         path: The PNG, 1600 × 1000; folders are made.
-        cut: The insertion in its present state; the first solid of a layered body is drawn.
+        cut: The insertion in its present state.
         view: Further arguments of `cutsim.results.pictures.draw_body`, such as a ``window``, or ``mirror=("z",)`` to
             show the whole of a body that is modelled by half.
     """
-    draw_stress(path, cut.body.solids[0], cut.body.cracks[0], **{"tool": tool_surface(cut), **view})
+    draw_stress(path, cut.body.solids, cut.body.cracks[0], **{"tool": tool_surface(cut), **view})
 
 
 def tool_surface(cut: Insertion) -> pyvista.PolyData | None:

@@ -32,7 +32,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
@@ -51,11 +50,12 @@ from cutsim import (
     run,
 )
 from cutsim.results.output import claim_folder, interpolate
-from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism
+from cutsim.results.pictures import draw_body, gather_grid
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
 from cutsim.studies.insertion_heat import Conductor, ThermalCut, heated
 from cutsim.studies.insertion_work import audited_toughness, steady_force
+from cutsim.studies.picture import draw_insertion, tool_surface
 
 MESH = geometry("block")
 
@@ -253,34 +253,17 @@ def draw(cut: Insertion, history: History, law: Exponential, out: Path, temperat
         whole = {n: v * cut.symmetry_factor if n.startswith(("work", "energy")) else v for n, v in history.items()}
         whole["energy_closure"] = history["energy_closure"]
         plot_energy(out / "energy.png", whole, x="time", xlabel="way of the tool [mm]")
-    u = cut.state.u
-    von_mises = fem.Function(fem.functionspace(cut.state.mesh, ("DG", 0)))
-    stress = ufl.dev(cut.body.solids[0].cauchy_stress(u))
-    interpolate(von_mises, ufl.sqrt(1.5 * ufl.inner(stress, stress)))
-    fields = {"von Mises": von_mises}
+    view = {
+        "tool": tool_surface(cut),
+        "mirror": ("z",) if dim == 3 else (),
+        "window": (-7.0, 7.0, -4.4, 1.5, -5.5, 5.5) if dim == 3 else (-4.2, 4.2, -cut.frame.height, 1.0, 0.0, 0.0),
+    }
+    draw_insertion(out / "cut.png", cut, **view)
     if temperature is not None:
-        fields["heating"] = fem.Function(von_mises.function_space)
-        interpolate(fields["heating"], temperature - ROOM)
-    grid, crack = gather_grid(u, fields), cut.body.cracks[0]
-    facets = gather_facets(u, crack.points.facets, crack.facet_mean("damage"))
-    tip = np.asarray(cut.contacts[0].position.value)
-    tip = np.where(np.arange(dim) == 1, tip, 0.0)
-    edge = None if dim == 2 else (0.0, 0.0, WIDTH)
-    start = tip if dim == 2 else tip - (0.0, 0.0, WIDTH / 2)
-    tool = prism(cut.tool.outline(max(HEIGHT, 1.0 - tip[1])), start, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), edge)
-    labels = {"von Mises": ("cut", "von Mises stress [MPa]"), "heating": ("temperature", "temperature rise [K]")}
-    for field in fields:
-        name, label = labels[field]
-        draw_body(
-            out / f"{name}.png",
-            grid,
-            field,
-            label=label,
-            tool=tool,
-            crack=facets if field == "von Mises" else None,
-            mirror=("z",) if dim == 3 else (),
-            window=(-7.0, 7.0, -4.4, 1.5, -5.5, 5.5) if dim == 3 else (-4.2, 4.2, -cut.frame.height, 1.0, 0.0, 0.0),
-        )
+        heating = fem.Function(fem.functionspace(cut.state.mesh, ("DG", 0)))
+        interpolate(heating, temperature - ROOM)
+        grid = gather_grid(cut.state.u, {"heating": heating})
+        draw_body(out / "temperature.png", grid, "heating", label="temperature rise [K]", **view)
 
 
 # With friction above the tangent of the half angle, 0.2, the faces stick to the blade and are dragged along.  Little is

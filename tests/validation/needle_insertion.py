@@ -20,8 +20,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-import ufl
-from dolfinx import fem
 from mpi4py import MPI
 
 from cutsim import (
@@ -36,11 +34,12 @@ from cutsim import (
     read_geo,
     run,
 )
-from cutsim.results.output import claim_folder, interpolate
-from cutsim.results.pictures import draw_body, gather_facets, gather_grid, prism, revolved
+from cutsim.results.output import claim_folder
+from cutsim.results.pictures import draw_stress
 from cutsim.results.plots import Curve, plot_curves, plot_energy, plot_parts
 from cutsim.results.recording import Recording
 from cutsim.studies.insertion_work import TwoInsertions, force_parts
+from cutsim.studies.picture import draw_insertion, tool_surface
 
 # Silicone 1 of the thesis: Young's modulus [MPa], Poisson's ratio; viscosity [MPa s] at a speed of 1 mm/s, which
 # carries the run across the small jumps of a crack with friction; its share is an entry of the energy audit.
@@ -189,37 +188,17 @@ def plot(out: Path, cut: Insertion, history: History, parts: History) -> None:
 
 def draw(cut: Insertion, out: Path) -> None:
     """The body in a plane through the axis, and in space also the plane of the crack."""
-    dim, u = cut.state.mesh.geometry.dim, cut.state.u
-    von_mises = fem.Function(fem.functionspace(cut.state.mesh, ("DG", 0)))
-    stress = ufl.dev(cut.body.solids[0].cauchy_stress(u))
-    interpolate(von_mises, ufl.sqrt(1.5 * ufl.inner(stress, stress)))
-    grid = gather_grid(u, {"von Mises": von_mises})
-    crack = cut.body.cracks[0]
-    facets = gather_facets(u, crack.points.facets, crack.facet_mean("damage"))
-    depth = cut.depth
-    outline, tip = cut.tool.outline(depth + 1.0), (0.0, -depth, 0.0)
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
-    label = "von Mises stress [MPa]"
+    dim, depth = cut.state.mesh.geometry.dim, cut.depth
     if dim == 2:
-        wall = (
-            cut.state.mesh.comm.allreduce(float(crack.points.submesh.geometry.x[:, 0].max(initial=0.0)), MPI.MAX),
-            0,
-            0,
-        )
-        draw_body(
-            out / "section.png", grid, "von Mises", label=label, tool=prism(outline, tip, axes), mirror=("x",),
-            clip=((-1.0, 0.0, 0.0), wall), window=(-3.0, 3.0, -depth - 1.5, 0.8, 0.0, 0.0),
-        )  # fmt: skip
+        points = cut.body.cracks[0].points.submesh.geometry.x
+        wall = (cut.state.mesh.comm.allreduce(float(points[:, 0].max(initial=0.0)), MPI.MAX), 0, 0)
+        box = (-3.0, 3.0, -depth - 1.5, 0.8, 0.0, 0.0)
+        draw_insertion(out / "section.png", cut, mirror=("x",), clip=((-1.0, 0.0, 0.0), wall), window=box)
         return
-    needle = revolved(outline, tip, axes)
     box = (-3.0, 3.0, -depth - 1.5, 1.0, -3.0, 3.0)
-    draw_body(
-        out / "section.png", grid, "von Mises", label=label, tool=needle, window=box, view=(0.5, 0.5, -1.6),
-    )  # fmt: skip
-    draw_body(
-        out / "crack.png", grid, "von Mises", label=label, tool=needle, crack=facets, mirror=("z",),
-        clip=((-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)), window=box, view=(-1.6, 0.3, 0.4),
-    )  # fmt: skip
+    tool, across = tool_surface(cut), ((-1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    draw_stress(out / "section.png", cut.body.solids, tool=tool, window=box, view=(0.5, 0.5, -1.6))
+    draw_insertion(out / "crack.png", cut, mirror=("z",), clip=across, window=box, view=(-1.6, 0.3, 0.4))
 
 
 # With friction the two insertions differ by more than the new surface: the force that opens the crack presses on the

@@ -34,18 +34,17 @@ from typing import Annotated
 import matplotlib
 import numpy as np
 import typer
-import ufl
 from dolfinx import fem
 from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from cutsim import Blade, Drive, Exponential, Fixture, Insertion, LayeredBlock, StepControl, laminate, run
-from cutsim.base.compat import nodal_expression
 from cutsim.results.output import claim_folder
-from cutsim.results.pictures import draw_body, gather_grid, prism
+from cutsim.results.pictures import draw_body, gather_grid, von_mises
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
 from cutsim.studies.layered import Layer, skin
+from cutsim.studies.picture import tool_surface
 
 COMM = MPI.COMM_WORLD
 HALF_ANGLE, HALF_THICKNESS = float(np.deg2rad(12.0)), 0.2  # of the blade [mm]
@@ -185,15 +184,11 @@ def draw(cut: Insertion, history: History, out: Path) -> None:
         plot_layers(cut.body, history, out / "layer_energies.png")
         plot_energy(out / "energy.png", history, x="time", xlabel="way of the blade [mm]")
     block, space = cut.body, fem.functionspace(cut.body.state.mesh, ("DG", 0))
-    number, stress = fem.Function(space), fem.Function(space)
+    number, stress = fem.Function(space), von_mises(block.solids)
+    stress.x.array[:] *= 1e3
     for i, solid in enumerate(block.solids, start=1):
-        deviator = ufl.dev(solid.cauchy_stress(block.state.u))
-        mises = 1e3 * ufl.sqrt(1.5 * ufl.inner(deviator, deviator))
-        stress.interpolate(nodal_expression(mises, space), solid.cells)
         number.x.array[space.dofmap.list[solid.cells, 0]] = i
     grid = gather_grid(block.state.u, {"layer": number, "stress": stress})
-    tip = np.asarray(cut.contacts[0].position.value)
-    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     labels = {"layer": "layer, from the surface downwards", "stress": "von Mises stress [kPa]"}
     for field, label in labels.items():
         draw_body(
@@ -201,8 +196,8 @@ def draw(cut: Insertion, history: History, out: Path) -> None:
             grid,
             field,
             label=label,
-            tool=prism(cut.tool.outline(1.0 - tip[1]), tip, axes),
-            window=(-0.9, 0.9, tip[1] - 0.3, 0.3, 0.0, 0.0),
+            tool=tool_surface(cut),
+            window=(-0.9, 0.9, -cut.depth - 0.3, 0.3, 0.0, 0.0),
             limits=(0.0, len(block.layers)) if field == "layer" else None,
         )
 
