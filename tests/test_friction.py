@@ -10,6 +10,7 @@ from cutsim.analysis.stepping import StepControl, begin, run
 from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
+from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb, SmoothCoulomb
@@ -225,10 +226,11 @@ def test_friction_falls_with_the_hotter_side(hot):
     """μ(T) = μ (T_d − T)²/(T_d − T_ref)² with the temperature of the hotter face; none above T_d."""
     for warm in (320.0, 500.0):
         b = make_blocks()
-        temperature = fem.Function(cracked_space(b.state.mesh, ("Lagrange", 1), b.facets))
-        temperature.x.array[:] = 290.0
-        temperature.interpolate(lambda x, warm=warm: 0 * x[0] + warm, b.lower if hot == "+" else b.upper)
-        temperature.x.scatter_forward()
+        space = cracked_space(b.state.mesh, ("Lagrange", 1), b.facets)
+        field = fem.Function(space)
+        field.x.array[:] = 290.0
+        field.interpolate(lambda x, warm=warm: 0 * x[0] + warm, b.lower if hot == "+" else b.upper)
+        temperature = Temperature(b.state, space, field)
         crack = b.crack(None, contact=PenaltyContact(NORMAL))
         law = Coulomb(MU, 1e5, T_ref=300.0, T_damage=400.0)
         friction = CrackFriction(crack, law, temperature=temperature)
@@ -328,5 +330,5 @@ def test_refuses_an_option():
     crack = make_blocks().crack(None)
     with pytest.raises(ValueError, match="acts_on = 'all' is not allowed"):
         CrackFriction(crack, LAW, acts_on="all")
-    with pytest.raises(ValueError, match=r"stick = 0.0 is not allowed"):
+    with pytest.raises(ValueError, match=r"allowed_slip = 0.0 is not allowed"):
         CrackFriction(crack, LAW, allowed_slip=0.0)
