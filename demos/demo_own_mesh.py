@@ -32,7 +32,7 @@ folder, comm = Path("results/own_mesh"), MPI.COMM_WORLD
 #
 # The plane between the strips is a line *inside* the mesh, with a single set of nodes: do not double them.  Everything
 # that the simulation speaks of gets a physical group with a name: the two strips, the line with and without glue, and
-# the grips.  The nodes may be fine where the strips are glued, and coarse elsewhere.  Only one rank draws.
+# the grips.  The elements are small where the strips are glued.  Only one rank draws.
 #
 # In 3-D nothing changes but the dimensions: the plane is then a surface inside the volumes.
 
