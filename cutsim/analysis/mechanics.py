@@ -190,14 +190,14 @@ class Mechanics(Balance[Term, Support]):
         """Trial history, energies and reactions of the converged trial state. Collective."""
         for part in (*self.terms, *self._observers):
             part.evaluate()
-        fixed, old = self.problem.fixed, self._residual.committed
-        residual = self.motion.forces(self._out_of_balance(), old, ~fixed)
+        old, supported = self._residual.committed, self.problem.supported
+        residual = self.motion.forces(self._out_of_balance(), old, supported)
         rates = [forces for t in offering(self.terms, RateDependent) if (forces := t.rate_forces()) is not None]
         rate_forces = np.sum([np.zeros_like(residual), *rates], axis=0)
         mean = 0.5 * (residual + old)
         if self._jerks():  # what follows the velocity has its value at the end of the step from its beginning on
             mean += 0.5 * (rate_forces - self._rate_forces.committed)
-        work = global_dot(self.state.mesh.comm, mean[fixed], self.state.increment[fixed])
+        work = global_dot(self.state.mesh.comm, supported(mean), self.state.increment)
         work += sum((t.external_work() for t in offering(self.terms, Loading)), start=0.0)
         self._residual.trial, self._rate_forces.trial, self._moved.trial = residual, rate_forces, True
         self._audit.trial = self.audit.advance(work, self._energies())

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.arrays import Array
 from cutsim.base.assembly import box
+from cutsim.base.checks import place
 from cutsim.fields.pieces import connected_pieces
 from cutsim.fields.state import State
 from cutsim.solvers.preconditioners import rigid_motions
@@ -20,7 +21,7 @@ _MOST_PIECES = 60
 
 def free_motion(
     state: State,
-    held: NDArray[np.bool_],
+    supported: Callable[[Array], Array],
     resistance: Callable[[Array], tuple[Array, float]],
     bodies: Mapping[str, NDArray[np.int32] | None],
 ) -> str | None:
@@ -30,7 +31,7 @@ def free_motion(
 
     Args:
         state: Displacement.
-        held: Which owned dofs are prescribed.
+        supported: Gives the part of owned motions, one a row, that supports hold.
         resistance: Gives the forces against some motions, both of shape (motions, owned dofs), and a stiffness to
             compare with [force/length].
         bodies: Local cells of each body by name; None for all.
@@ -51,7 +52,7 @@ def free_motion(
         motions[p * kinds : (p + 1) * kinds] = np.where(piece[:nodes, None] == p, modes, 0.0).reshape(kinds, -1)
     sizes = np.array([comm.allreduce(np.count_nonzero(piece[:nodes] == p)) for p in range(count)])
     forces, stiffness = resistance(motions)
-    matrix = motions @ forces.T / (stiffness or 1.0) + motions[:, held] @ motions[:, held].T
+    matrix = motions @ forces.T / (stiffness or 1.0) + motions @ supported(motions).T
     matrix = comm.allreduce(0.5 * (matrix + matrix.T))
     scale = 1 / np.sqrt(np.repeat(np.maximum(sizes, 1), kinds))
     values, vectors = np.linalg.eigh(scale[:, None] * matrix * scale)
@@ -106,5 +107,5 @@ def _words(free: Array, gdim: int, *, axisymmetric: bool) -> str:
     if along:
         return "slide along " + " and ".join(along) + (" and turn" if len(space) > len(along) else "")
     if np.abs(space[0, len(axes) :]).max(initial=0.0) < 1e-6:
-        return "slide along ({})".format(", ".join(f"{c:.3g}" for c in space[0]))
+        return f"slide along {place(space[0, : len(axes)])}"
     return "turn"

@@ -3,9 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from cutsim.analysis.mobility import free_motion
 from cutsim.base.arrays import Array
@@ -48,7 +46,7 @@ class Motion(Protocol):
     def predict(self) -> None:
         """Start the search for the end of the step where the last one leads."""
 
-    def forces(self, solved: Array, old: Array, free: NDArray[np.bool_]) -> Array:
+    def forces(self, solved: Array, old: Array, supported: Callable[[Array], Array]) -> Array:
         """Forces at the end of a step, from the residual of its balance; see `Inertia.balance`. Collective."""
 
     def advise(self) -> str:
@@ -75,7 +73,7 @@ class QuasiStatic:
             ValueError: A piece of a body can move as a rigid body, and nothing resists at the committed state.
         """
         bodies = {b.name: b.cells for b in offering(self._terms, Body)}
-        motion = free_motion(self._state, problem.fixed, problem.resistance, bodies)
+        motion = free_motion(self._state, problem.supported, problem.resistance, bodies)
         if motion is not None:
             raise ValueError(
                 f"{motion}: neither a support nor a bond nor a closed contact holds it. Add a Support, let the "
@@ -96,7 +94,7 @@ class QuasiStatic:
         """Go on at the rate of the last step."""
         self._state.predict()
 
-    def forces(self, solved: Array, old: Array, free: NDArray[np.bool_]) -> Array:
+    def forces(self, solved: Array, old: Array, supported: Callable[[Array], Array]) -> Array:
         """The residual itself."""
         return solved
 
@@ -127,9 +125,8 @@ class Dynamic:
         for term in self._terms:
             term.evaluate()
         state.commit()
-        for support in self._supports:
-            self._inertia.prescribe(support.dofs, *support.rates(state.time, end))
-        return self._inertia.start(static(), problem.bcs, problem.fixed)
+        prescribed = [(s.dofs, *s.rates(state.time, end)) for s in self._supports]
+        return self._inertia.start(static(), problem.bcs, problem.directions, prescribed)
 
     def known(self, old: Array) -> Array | float:
         """What the scheme takes from the start of the step."""
@@ -138,9 +135,9 @@ class Dynamic:
     def predict(self) -> None:
         """Nothing: the step has started at the present velocity already."""
 
-    def forces(self, solved: Array, old: Array, free: NDArray[np.bool_]) -> Array:
+    def forces(self, solved: Array, old: Array, supported: Callable[[Array], Array]) -> Array:
         """Forces R + M a at the end of the step. Collective."""
-        return self._inertia.balance(solved, old, free)
+        return self._inertia.balance(solved, old, supported)
 
     def advise(self) -> str:
         """Nothing is known."""

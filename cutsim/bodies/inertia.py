@@ -24,6 +24,10 @@ from cutsim.base.terms import Body, Term
 from cutsim.bodies.mass import Mass
 from cutsim.bodies.schemes import Scheme
 from cutsim.fields.state import State
+from cutsim.solvers.directions import Directions
+
+#: Owned dofs of a support, their velocity and acceleration.
+Prescribed = tuple[NDArray[np.int32], float, float]
 
 Velocity = Callable[[NDArray[np.float64]], NDArray[np.float64]] | Sequence[float]
 
@@ -109,25 +113,29 @@ class Inertia(Term):
         """Whether the first step has begun; the initial velocity is then history."""
         return self._started.committed
 
-    def prescribe(self, dofs: NDArray[np.int32], velocity: float, acceleration: float) -> None:
-        """Initial motion of owned dofs that a support moves."""
-        self.velocity.x.array[dofs], self.acceleration.x.array[dofs] = velocity, acceleration
-
-    def start(self, static: Array, bcs: Sequence[fem.DirichletBC], fixed: NDArray[np.bool_]) -> Array:
-        """Initial accelerations M a = −R, those of the prescribed dofs given. Collective.
+    def start(
+        self, static: Array, bcs: Sequence[fem.DirichletBC], directions: Directions, prescribed: Sequence[Prescribed]
+    ) -> Array:
+        """Initial velocities, and accelerations M a = −R, those of the supports given. Collective.
 
         Args:
             static: Owned static forces R, internal minus external [force].
-            bcs: Dirichlet conditions.
-            fixed: Which owned dofs they prescribe.
+            bcs: Dirichlet conditions on components.
+            directions: What is prescribed along other directions.
+            prescribed: Owned dofs, velocity and acceleration of each support, along the axes of the nodes.
 
         Returns:
             Forces R + M a: zero but for those of the supports.
         """
-        a = self.acceleration.x
+        n, fixed = len(static), np.zeros(len(static), dtype=bool)
+        a, v = self.acceleration.x, self.velocity.x
+        velocity, acceleration = (directions.turn(x.array[:n].copy()) for x in (v, a))
+        for dofs, first, second in prescribed:
+            velocity[dofs], acceleration[dofs], fixed[dofs] = first, second, True
+        v.array[:n], a.array[:n] = directions.back(velocity), directions.back(acceleration)
         a.scatter_forward()
-        known = self.mass.times(a.array)
-        a.array[: len(static)] = self.mass.divide(np.where(fixed, a.array[: len(static)], -static - known), bcs)
+        forces = directions.turn(-static - self.mass.times(a.array))
+        a.array[:n] = directions.back(self.mass.divide(np.where(fixed, acceleration, forces), bcs, directions))
         for field, remembered in ((self.velocity, self._velocity), (self.acceleration, self._acceleration)):
             field.x.scatter_forward()
             remembered.commit()
@@ -175,7 +183,7 @@ class Inertia(Term):
         work = self._dot(0.5 * (forces + old.forces), self.state.increment)
         self._books.trial = _Books(forces, kinetic, old.numerical + work - (kinetic - old.kinetic))
 
-    def balance(self, solved: Array, old: Array, free: NDArray[np.bool_]) -> Array:
+    def balance(self, solved: Array, old: Array, supported: Callable[[Array], Array]) -> Array:
         """Forces R + M a at the end of the step; call after `evaluate`. Collective.
 
         A scheme with α_f > 0 balances forces within the step, so that those at its end are out of balance. Their work
@@ -184,11 +192,12 @@ class Inertia(Term):
         Args:
             solved: Owned residual of the step's balance, R + c M a + h.
             old: Forces R + M a at the start of the step.
-            free: Owned dofs without a support.
+            supported: Gives the part of owned forces that supports hold.
         """
         s, books = self.scheme, self._books.trial
         forces = solved - self.history(old) + (s.alpha_m - s.alpha_f) / (1 - s.alpha_f) * books.forces
-        work = self._dot(np.where(free, 0.5 * (forces + old), 0.0), self.state.increment)
+        mean = 0.5 * (forces + old)
+        work = self._dot(mean - supported(mean), self.state.increment)
         self._books.trial = _Books(books.forces, books.kinetic, books.numerical - work)
         return forces
 

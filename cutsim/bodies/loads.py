@@ -39,12 +39,16 @@ class Support:
         corners: Times at which the velocity jumps.
 
     Attributes:
-        dofs: Owned dofs that it holds.
-        symbol: The component in words, such as "u_x".
-        sign: −1 if the direction is against the component, else 1.
+        nodes: Local nodes (blocked dofs) that it holds, ghosts included.
+        direction: Unit vector along which the displacement is prescribed; of two opposite ones always the same.
+        sign: 1 if this is the direction that was given, −1 if it is the opposite one.
+        component: Index of the component if the direction is that of one, else None.
+        dofs: Owned dofs that it holds; for a direction that is no component the mechanical problem finds them, among
+            components that these nodes have along axes of their own (`cutsim.solvers.directions`).
+        symbol: What is prescribed in words, such as "u_x".
 
     Raises:
-        ValueError: The component does not exist, the direction is along no axis, or no entity is found on any rank.
+        ValueError: The component does not exist, the direction has no length, or no entity is found on any rank.
     """
 
     @checked
@@ -61,29 +65,35 @@ class Support:
     ) -> None:
         gdim = state.mesh.geometry.dim
         require_numbers("corners", corners, least=0)
-        component, self.sign = _axis(component, gdim)
+        self.direction, self.sign = _direction(component, gdim)
         tdim = state.mesh.topology.dim
         require("dim", dim, dim is None or dim in range(tdim + 1), f"0 … {tdim}, or None for facets")
         dim = tdim - 1 if dim is None else dim
-        self.name, self.state, self.component, self.corners = name, state, component, corners
-        self.symbol = f"u_{'xyz'[component]}"
+        self.name, self.state, self.corners = name, state, corners
+        self.component = int(np.argmax(self.direction)) if np.count_nonzero(self.direction) == 1 else None
         prescribed = value if self.sign > 0 else _opposite(value)
         self._value = Schedule(state.mesh, state.memory, prescribed, "value", name or "support")
-        dofs = gdim * locate_dofs(state.V, dim, entities) + component
-        owned = len(state.increment)
-        self.dofs = dofs[dofs < owned]
-        found = state.mesh.comm.allreduce(len(self.dofs))
+        self.nodes = locate_dofs(state.V, dim, entities)
+        found = state.mesh.comm.allreduce(np.count_nonzero(self.nodes < state.V.dofmap.index_map.size_local))
         require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
-        self.bc = fem.dirichletbc(self._value.constant, dofs, state.V.sub(component))
+        self.dofs: NDArray[np.int32] = np.empty(0, dtype=np.int32)
+        self.bc: fem.DirichletBC | None = None
+        if self.component is None:
+            self.symbol = f"u along ({', '.join(f'{c:.4g}' for c in self.direction)})"
+            return
+        self.symbol = f"u_{'xyz'[self.component]}"
+        dofs = gdim * self.nodes + self.component
+        self.dofs = dofs[dofs < len(state.increment)]
+        self.bc = fem.dirichletbc(self._value.constant, dofs, state.V.sub(self.component))
 
     @property
     def prescribed(self) -> float:
-        """Prescribed displacement component at the end of the step [length]."""
+        """Prescribed displacement along `direction` at the end of the step [length]."""
         return self._value.value
 
     @property
     def displacement(self) -> float:
-        """Prescribed displacement along the direction at the end of the step [length]."""
+        """Prescribed displacement along the direction that was given, at the end of the step [length]."""
         return self.sign * self.prescribed
 
     def begin(self) -> None:
@@ -99,21 +109,24 @@ class Support:
         return {f"{self.name}_displacement": (self.displacement, "length"), f"{self.name}_force": (reaction, "force")}
 
     def rates(self, start: float, end: float) -> tuple[float, float]:
-        """Prescribed velocity and acceleration of the component at the start of a span of time without a corner."""
+        """Prescribed velocity and acceleration along `direction` at the start of a span of time without a corner."""
         return self._value.rates(start, end)
 
 
-def _axis(component: int | tuple[float, ...], gdim: int) -> tuple[int, int]:
-    """A component or a direction as a component and a sign."""
+def _direction(component: int | tuple[float, ...], gdim: int) -> tuple[NDArray[np.float64], int]:
+    """A component or a direction as a unit vector, and 1, or −1 if it is the opposite one."""
     if not isinstance(component, Sequence | np.ndarray):
         require_number("component", component, count())
         require("component", component, component in range(gdim), f"0 … {gdim - 1}")
-        return int(component), 1
+        return np.eye(gdim)[component], 1
     require_numbers("component", component, length=gdim)
-    axis = int(np.argmax(np.abs(component)))
-    rest = np.linalg.norm(np.delete(component, axis))
-    require("component", component, rest <= _STRAIGHT * abs(component[axis]), "a direction along an axis")
-    return axis, 1 if component[axis] > 0 else -1
+    length = float(np.linalg.norm(component))
+    require("component", component, length > 0, "a direction, not all zero")
+    unit = np.array(component) / length
+    unit[np.abs(unit) < _STRAIGHT] = 0.0
+    # the first component that is not small tells a direction from its opposite
+    sign = 1 if unit[np.abs(unit) > 0.5][0] > 0 else -1
+    return sign * unit / np.linalg.norm(unit), sign
 
 
 def _opposite(value: float | TimeFunction) -> float | TimeFunction:

@@ -13,6 +13,7 @@ from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Body
 from cutsim.fields.state import State
+from cutsim.solvers.directions import Directions
 from cutsim.solvers.tangent import Tangent
 
 
@@ -52,10 +53,20 @@ class Mass:
         self._field.x.array[:] = field
         return nodal_forces(self._product)
 
-    def divide(self, forces: Array, bcs: Sequence[fem.DirichletBC]) -> Array:
-        """The field whose product with the matrix, prescribed rows aside, are owned forces. Collective."""
+    def divide(self, forces: Array, bcs: Sequence[fem.DirichletBC], directions: Directions) -> Array:
+        """The field whose product with the matrix, prescribed rows aside, are owned forces. Collective.
+
+        Args:
+            forces: The forces along the axes of the nodes, and in prescribed rows the values of the field.
+            bcs: Dirichlet conditions on components.
+            directions: What is prescribed along other directions.
+
+        Returns:
+            The owned field along the axes of the nodes.
+        """
         V = self._state.V
-        mass = Tangent(compat.form(self.form(ufl.TrialFunction(V), ufl.TestFunction(V))), V, symmetric=True)
+        form = compat.form(self.form(ufl.TrialFunction(V), ufl.TestFunction(V)))
+        mass = Tangent(form, V, symmetric=True, directions=directions)
         mass.assemble(bcs)
         x, b = mass.A.createVecs()
         b.array[:] = forces

@@ -13,6 +13,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Columns, Constrained, Diagnosing, Showing, Term, offering
 from cutsim.fields.constraints import Constraints, Prescribed
 from cutsim.fields.state import State
+from cutsim.solvers.directions import Directions, Guided
 from cutsim.solvers.iterations import Outcome
 from cutsim.solvers.newton import Kept, NonlinearProblem
 from cutsim.solvers.system import Structure
@@ -22,11 +23,11 @@ class Held(Prescribed, Protocol):
     """Protocol of a value that is prescribed on some dofs and may change in time.
 
     Attributes:
-        bc: Its Dirichlet condition.
+        bc: Its Dirichlet condition; None if it is prescribed along no component (`cutsim.solvers.directions`).
         corners: Times at which its rate jumps.
     """
 
-    bc: fem.DirichletBC
+    bc: fem.DirichletBC | None
     corners: tuple[float, ...]
 
     def begin(self) -> None:
@@ -84,19 +85,21 @@ class Balance(Generic[T, H]):
         require("names", names, len(set(names)) == len(names), f"different for all terms and {kind}")
         self.state, self.terms, self._held = state, tuple(terms), tuple(held)
         self._parts: tuple[T | H, ...] = (*terms, *held)
+        directions = Directions(unknown.function_space, offering(held, Guided))
         self._constraints = Constraints(unknown.function_space, held, kind, rounding)
         self._constraints.check(state.time)
         v = ufl.TestFunction(unknown.function_space)
         self.problem = NonlinearProblem(
             sum((t.residual(v) for t in terms), start=ufl.Form([])),
             unknown,
-            bcs=[h.bc for h in held],
+            bcs=[h.bc for h in held if h.bc is not None],
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
             structure=Structure(
                 symmetric=all(t.symmetric for t in terms),
                 assemblers=[a for t in terms for a in t.assemblers],
                 multipliers=[m for t in offering(terms, Constrained) for m in t.multipliers],
                 interface_dofs=interface_dofs,
+                directions=directions,
             ),
             **solver,
         )
@@ -140,7 +143,7 @@ class Balance(Generic[T, H]):
 
     def reaction(self, held: H) -> float:
         """What a prescribed value takes from the balance in the trial state. Collective."""
-        return self._constraints.reaction(held, self._residual.trial)
+        return self._constraints.reaction(held, self.problem.directions.turn(self._residual.trial))
 
     def watch(self) -> None:
         """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""

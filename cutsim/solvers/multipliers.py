@@ -19,6 +19,7 @@ from petsc4py import PETSc
 from cutsim.base.assembly import Array
 from cutsim.base.compat import form
 from cutsim.base.terms import Multiplier
+from cutsim.solvers.directions import Directions
 
 
 class Multipliers:
@@ -27,11 +28,18 @@ class Multipliers:
     Args:
         multipliers: Unknowns and equations.
         u: The displacement.
-        bcs: Dirichlet conditions on the displacement.
+        bcs: Dirichlet conditions on components of the displacement.
+        directions: What is prescribed along other directions.
     """
 
-    def __init__(self, multipliers: Sequence[Multiplier], u: fem.Function, bcs: Sequence[fem.DirichletBC]) -> None:
-        self._rows = [_Row(m, u, bcs) for m in multipliers]
+    def __init__(
+        self,
+        multipliers: Sequence[Multiplier],
+        u: fem.Function,
+        bcs: Sequence[fem.DirichletBC],
+        directions: Directions,
+    ) -> None:
+        self._rows = [_Row(m, u, bcs, directions) for m in multipliers]
         # B and C in parts, whole, and with K
         self._parts: list[PETSc.Mat] = []
         self._blocks: list[PETSc.Mat] = []
@@ -94,41 +102,66 @@ class Multipliers:
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
-        for matrices in (self._joint, self._blocks, self._parts, [M for row in self._rows for M in (row.B, row.C)]):
+        for matrices in (self._joint, self._blocks, self._parts):
             _destroy(matrices)
+        for row in self._rows:
+            row.destroy()
 
 
 class _Row:
     """One multiplier: its equation and the two blocks of its row."""
 
-    def __init__(self, multiplier: Multiplier, u: fem.Function, bcs: Sequence[fem.DirichletBC]) -> None:
-        self.value, self._u, self._bcs = multiplier.value, u, list(bcs)
+    def __init__(
+        self, multiplier: Multiplier, u: fem.Function, bcs: Sequence[fem.DirichletBC], directions: Directions
+    ) -> None:
+        self.value, self._u, self._bcs, self._directions = multiplier.value, u, list(bcs), directions
         Q, V = self.value.function_space, u.function_space
         self.n = Q.dofmap.index_map.size_local
         self._g = form(multiplier.equation)
         self._by_u = form(ufl.derivative(multiplier.equation, u, ufl.TrialFunction(V)))
         self._by_value = form(ufl.derivative(multiplier.equation, self.value, ufl.TrialFunction(Q)))
         self.B, self.C = petsc.create_matrix(self._by_u), petsc.create_matrix(self._by_value)
+        self._components: PETSc.Mat | None = None
+        if directions:
+            self._turn()
         self._r = la.vector(Q.dofmap.index_map)
+
+    def _turn(self) -> None:
+        """Give B its columns along the axes of the nodes."""
+        self._components, self._axes = self.B, self._directions.matrix()
+        petsc.assemble_matrix(self._components, self._by_u, self._bcs)
+        self._components.assemble()
+        self.B = self._components.matMult(self._axes)
+        self._free = self.B.createVecRight()
+        self._free.set(1.0)
+        self._free.array[self._directions.held] = 0.0
 
     def residual(self) -> Array:
         self._r.array[:] = 0.0
         fem.assemble_vector(self._r.array, self._g)
-        fem.apply_lifting(self._r.array, [self._by_u], [self._bcs], [self._u.x.array], -1.0)
+        bcs = [*self._directions.lifting(self._u.x.array), *self._bcs]
+        fem.apply_lifting(self._r.array, [self._by_u], [bcs], [self._u.x.array], -1.0)
         self._r.scatter_reverse(la.InsertMode.add)
         return self._r.array[: self.n]
 
     def assemble(self) -> None:
-        for matrix, a in ((self.B, self._by_u), (self.C, self._by_value)):
+        for matrix, a in ((self._components or self.B, self._by_u), (self.C, self._by_value)):
             matrix.zeroEntries()
             petsc.assemble_matrix(matrix, a, self._bcs)
             matrix.assemble()
+        if self._components is not None:
+            self._components.matMult(self._axes, result=self.B)
+            self.B.diagonalScale(None, self._free)
+
+    def destroy(self) -> None:
+        own = [] if self._components is None else [self._components, self._axes, self._free]
+        _destroy([self.B, self.C, *own])
 
 
 def _joined(parts: Sequence[Array]) -> Array:
     return np.concatenate([np.empty(0), *parts])
 
 
-def _destroy(matrices: Sequence[PETSc.Mat]) -> None:
-    for matrix in matrices:
-        matrix.destroy()
+def _destroy(things: Sequence[PETSc.Object]) -> None:
+    for thing in things:
+        thing.destroy()

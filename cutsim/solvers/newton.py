@@ -15,6 +15,7 @@ from cutsim.base import compat
 from cutsim.base.checks import require
 from cutsim.base.options import Options
 from cutsim.solvers.convergence import CRITERIA, Criteria
+from cutsim.solvers.directions import Directions
 from cutsim.solvers.iterations import LINE_SEARCHES, Iterations, Outcome
 from cutsim.solvers.lifetime import free_dropped
 from cutsim.solvers.preconditioners import LaggedPC
@@ -64,7 +65,7 @@ class NonlinearProblem:
     Attributes:
         known: Owned nodal forces that are added to those of F, such as the share of the last step in a time
             integration scheme; zero at first.
-        fixed: Which owned dofs have a Dirichlet condition.
+        fixed: Which owned unknowns have a Dirichlet condition.
         bcs: As above.
 
     Raises:
@@ -88,7 +89,7 @@ class NonlinearProblem:
         self._system = System(F, u, bcs, entity_maps, structure)
         self.known, self.fixed = self._system.forces.known, self._system.forces.fixed
         free_dropped(self._system.comm)
-        criteria = replace(criteria, by_start=criteria.by_start or not bcs)
+        criteria = replace(criteria, by_start=criteria.by_start or not (bcs or structure.directions))
         self._iterations = Iterations(self._system, criteria, self._options)
         self._force = 0.0
 
@@ -148,14 +149,23 @@ class NonlinearProblem:
         return self._system.forces.vector()
 
     def reactions(self) -> PETSc.Vec:
-        """Forces of the supports on the body at the present u: `residual` on constrained rows, zero elsewhere.
+        """Forces of the supports on the body at the present u: `residual` along what is prescribed, else zero.
 
         Returns:
             A new vector of the owned dofs; the caller owns it.
         """
         b = self.residual()
-        b.array[~self.fixed] = 0.0
+        b.array[:] = self.supported(b.array_r)
         return b
+
+    @property
+    def directions(self) -> Directions:
+        """Axes of the nodes at which something is prescribed along no component."""
+        return self._system.directions
+
+    def supported(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The part of owned nodal vectors, one a row, along what is prescribed: zero where nothing is."""
+        return self._system.supported(v)
 
     def resistance(self, motions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Forces against motions by the tangent at the present u, without any Dirichlet condition. Collective.

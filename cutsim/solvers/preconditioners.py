@@ -1,6 +1,6 @@
 """Preconditioners for the tangent: which one fits, how it is built, and when it is rebuilt."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -9,7 +9,7 @@ from dolfinx import fem, la
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from cutsim.base.assembly import owned_vector
+from cutsim.base.assembly import Array, owned_vector
 
 #: Unknowns up to which a factorisation is the fastest, by dimension of space.
 DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 10_000}
@@ -119,11 +119,12 @@ def _gmres(rtol: float, max_it: int) -> dict[str, Any]:
     return {"ksp_type": "gmres", "ksp_pc_side": "right", "ksp_rtol": rtol, "ksp_max_it": max_it}
 
 
-def rigid_body_modes(V: fem.FunctionSpace) -> PETSc.NullSpace:
+def rigid_body_modes(V: fem.FunctionSpace, turn: Callable[[Array], Array] = np.asarray) -> PETSc.NullSpace:
     """Translations and infinitesimal rotations of a displacement space, orthonormal. Collective.
 
     Args:
         V: Lagrange space of vectors with as many components as the space has dimensions, cracked or not.
+        turn: Gives the unknowns of owned nodal vectors, their components by default.
 
     Returns:
         3 modes in the plane, 6 in space, as near-nullspace for algebraic multigrid.
@@ -139,7 +140,7 @@ def rigid_body_modes(V: fem.FunctionSpace) -> PETSc.NullSpace:
     modes = rigid_motions(x)
     vectors = [owned_vector(V.dofmap.index_map, bs) for _ in modes]
     for vector, mode in zip(vectors, modes, strict=True):
-        vector.array[:] = mode.ravel()
+        vector.array[:] = turn(mode.ravel())
     _orthonormalise(vectors)
     return PETSc.NullSpace().create(vectors=vectors, comm=V.mesh.comm)
 

@@ -12,6 +12,7 @@ from petsc4py import PETSc
 
 from cutsim.base import compat
 from cutsim.base.terms import Assembler, Multiplier
+from cutsim.solvers.directions import Directions
 from cutsim.solvers.multipliers import Multipliers
 from cutsim.solvers.residual import Residual
 from cutsim.solvers.tangent import Tangent
@@ -26,12 +27,14 @@ class Structure:
         assemblers: Forces that are not in the form.
         multipliers: Further unknowns, on which the form depends, with their equations.
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
+        directions: What is prescribed along directions that are no components.
     """
 
     symmetric: bool = False
     assemblers: Sequence[Assembler] = ()
     multipliers: Sequence[Multiplier] = ()
     interface_dofs: NDArray[np.int32] | None = None
+    directions: Directions | None = None
 
 
 #: Nothing is known.
@@ -42,7 +45,7 @@ class System:
     """Forces on the displacement and equations of multipliers. Every method is collective.
 
     The vector of unknowns is that of PETSc's iterations and not that of u, which line searches would spoil as their own
-    start: the displacement comes first, then the multipliers.
+    start: the displacement comes first, along the axes of the nodes, then the multipliers.
 
     Args:
         F: Residual, linear in a test function of the space of u.
@@ -54,6 +57,7 @@ class System:
     Attributes:
         forces: The forces on the displacement.
         tangent: Their derivative.
+        directions: Axes of nodes.
         structure: As above.
         size: Global number of unknowns.
         reaction: Forces of the supports at the last residual, owned entries.
@@ -70,9 +74,10 @@ class System:
         self._u, self._bcs, self.structure = u, list(bcs), structure
         J = ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
         L, a = (compat.form(form, entity_maps=entity_maps) for form in (F, J))
-        self.forces = Residual(L, a, u, bcs, structure.assemblers)
-        self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers)
-        self._multipliers = Multipliers(structure.multipliers, u, bcs)
+        self.directions = structure.directions or Directions(u.function_space)
+        self.forces = Residual(L, a, u, bcs, structure.assemblers, self.directions)
+        self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers, self.directions)
+        self._multipliers = Multipliers(structure.multipliers, u, bcs, self.directions)
         self.size = int(self.comm.allreduce(len(self.unknowns)))
         self.reaction: NDArray[np.float64] = np.zeros(len(self.forces.held))
 
@@ -90,12 +95,12 @@ class System:
     @property
     def unknowns(self) -> NDArray[np.float64]:
         """A copy of the owned unknowns."""
-        return np.concatenate([self._u.x.array[: self.forces.n], self._multipliers.values])
+        return np.concatenate([self.directions.turn(self._u.x.array[: self.forces.n]), self._multipliers.values])
 
     def assign(self, x: NDArray[np.float64]) -> None:
         """Set the unknowns, ghosts included."""
         n = self.forces.n
-        self._u.x.array[:n] = x[:n]
+        self._u.x.array[:n] = self.directions.back(x[:n])
         self._u.x.scatter_forward()
         self._multipliers.assign(x[n:])
 
@@ -132,10 +137,10 @@ class System:
     def resistance(self, motions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Forces against motions at the present u; see `NonlinearProblem.resistance`."""
         self._prepare()
-        self.tangent.assemble(())
+        self.tangent.assemble((), held=False)
         x, y = self.tangent.A.createVecs()
         forces = np.empty_like(motions)
-        for motion, force in zip(motions, forces, strict=True):
+        for motion, force in zip(self.directions.turn(motions), forces, strict=True):
             x.array[:] = motion
             self.tangent.A.mult(x, y)
             force[:] = y.array_r
@@ -143,7 +148,11 @@ class System:
         y.destroy()
         diagonal = self.tangent.diagonal
         total, size = self.comm.allreduce(np.array([np.abs(diagonal).sum(), diagonal.size]))
-        return forces, float(total / size)
+        return self.directions.back(forces), float(total / size)
+
+    def supported(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The part of owned nodal vectors along what is prescribed, one a row."""
+        return self.directions.back(np.where(self.forces.fixed, self.directions.turn(v), 0.0))
 
     def cell_size(self) -> float:
         """Size of the largest cell [length]."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.terms import Assembler
+from cutsim.solvers.directions import Directions
 from cutsim.solvers.preconditioners import rigid_body_modes
 
 
@@ -24,15 +25,22 @@ class Tangent:
         V: Its space; displacements give the matrix their rigid-body modes as near-nullspace.
         symmetric: Whether it is symmetric.
         assemblers: Forces that are no form.
+        directions: Axes of the nodes, along which the matrix has its rows and columns.
 
     Attributes:
         A: The matrix.
     """
 
     def __init__(
-        self, a: fem.Form, V: fem.FunctionSpace, symmetric: bool, assemblers: Sequence[Assembler] = ()
+        self,
+        a: fem.Form,
+        V: fem.FunctionSpace,
+        symmetric: bool,
+        assemblers: Sequence[Assembler] = (),
+        directions: Directions | None = None,
     ) -> None:
         self._a, self._V, self._symmetric, self._assemblers = a, V, symmetric, tuple(assemblers)
+        self._directions = directions or Directions(V)
         if V.mesh.comm.size == 1:
             self._csr = fem.create_matrix(a, block_mode=la.BlockMode.expanded)
             n = len(self._csr.indptr) - 1
@@ -43,7 +51,8 @@ class Tangent:
             self._csr = None
             self._forms = petsc.create_matrix(a)
         self._added: PETSc.Mat | None = None
-        self.A = self._forms
+        self.A = self._sum = self._forms
+        self._axes = self._directions.matrix() if self._directions else None
         self._diagonal = self.A.createVecRight()
         self.renew()
 
@@ -67,17 +76,33 @@ class Tangent:
             self._added.assemble()
             # a matrix in which nothing was inserted would lose its pattern
             self._assemble_forms(())
-            self.A = self._forms.copy()
-            self.A.axpy(1.0, self._added, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+            self._sum = self._forms.copy()
+            self._sum.axpy(1.0, self._added, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        self.A = self._sum if self._axes is None else self._turned()
         self.A.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
         if self._V.dofmap.index_map_bs == self._V.mesh.geometry.dim > 1:
-            self.A.setNearNullSpace(rigid_body_modes(self._V))
+            self.A.setNearNullSpace(rigid_body_modes(self._V, self._directions.turn))
 
-    def assemble(self, bcs: Sequence[fem.DirichletBC]) -> None:
-        """Fill the matrix at the present state; constrained rows and columns are those of the identity."""
+    def _turned(self) -> PETSc.Mat:
+        """The matrix along the axes of the nodes, with values: one in which nothing was inserted has no pattern."""
+        if not self._assemblers:
+            self._assemble_forms(())
+        return self._sum.ptap(self._axes)
+
+    def assemble(self, bcs: Sequence[fem.DirichletBC], *, held: bool = True) -> None:
+        """Fill the matrix at the present state; constrained rows and columns are those of the identity.
+
+        Args:
+            bcs: Dirichlet conditions on components.
+            held: Whether what is prescribed along other directions constrains as well.
+        """
         self._assemble_forms(bcs)
         if self._added is not None:
             self._add(self._added, bcs)
+        if self._axes is not None:
+            self._sum.ptap(self._axes, result=self.A)
+            rows = self._directions.held if held else self._directions.held[:0]
+            self.A.zeroRowsColumns(rows + self.A.getOwnershipRange()[0])
         self.A.getDiagonal(self._diagonal)
 
     def _assemble_forms(self, bcs: Sequence[fem.DirichletBC]) -> None:
@@ -100,9 +125,9 @@ class Tangent:
             dofs = bc.dof_indices()[0]
             self._diagonal.array[dofs[dofs < self._diagonal.local_size]] = 0.0
         added.diagonalScale(self._diagonal, self._diagonal)
-        self.A.zeroEntries()
+        self._sum.zeroEntries()
         for part in (self._forms, added):
-            self.A.axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            self._sum.axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
 
     @property
     def diagonal(self) -> NDArray[np.float64]:
@@ -117,10 +142,14 @@ class Tangent:
     def _destroy_sum(self) -> None:
         if self._added is not None:
             self._added.destroy()
+            self._sum.destroy()
+        if self._axes is not None and self.A is not self._forms:
             self.A.destroy()
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
         self._destroy_sum()
+        if self._axes is not None:
+            self._axes.destroy()
         self._forms.destroy()
         self._diagonal.destroy()

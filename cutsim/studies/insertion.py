@@ -90,6 +90,8 @@ class Insertion:
         Raises:
             ValueError: A parameter is outside its range, the tool does not fit body or notch, or a group is missing.
         """
+        if not isinstance(friction, FrictionLaw):
+            require_number("friction", friction, nonnegative)
         fixture.check(body)
         _check_tool(tool, body)
         frame = Frame.of(body, tool, fixture.plate, fixture.symmetry if fixture.halved(body) else None)

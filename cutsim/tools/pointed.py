@@ -52,6 +52,8 @@ class Pointed(ABC):
             the quadratic start over the tip radius; as `contact` takes them.
     """
 
+    directions: ClassVar[tuple[str, ...]] = ("push", "lateral")
+
     half_angle: float
     tip_radius: float
     push: Direction

@@ -6,12 +6,15 @@ single formula gives tip, flank and shank without a kink.
 """
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from math import pi
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 import ufl
+from dolfinx import default_scalar_type, fem
+from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.base.checks import above, as_array, positive, require, require_number, require_numbers
@@ -33,6 +36,9 @@ class Shape(Protocol):
         """Signed distance at a position relative to the reference point [length], negative inside."""
 
 
+AnyShape = TypeVar("AnyShape", bound=Shape)
+
+
 def unit(name: str, vector: Direction) -> Direction:
     """Unit vector along one that the user gave under a name."""
     require_numbers(name, vector)
@@ -50,6 +56,23 @@ def check_directions(shape: Shape, gdim: int) -> None:
     for name, value in vars(shape).items():
         if isinstance(value, tuple):
             require(f"shape.{name}", value, len(value) == gdim, f"of {gdim} components, as the mesh has")
+
+
+def with_constant_directions(mesh: Mesh, shape: AnyShape) -> AnyShape:
+    """A shape whose directions are form constants, so that another one needs no other kernel.
+
+    The copy is for writing forms only. Which of its fields may be constants a shape says by a class attribute
+    `directions`, names of unit vectors that enter `distance` by vector algebra alone.
+
+    Args:
+        mesh: Mesh of the forms.
+        shape: The shape.
+    """
+    changed = copy(shape)
+    for name in getattr(type(shape), "directions", ()):
+        if (vector := getattr(shape, name)) is not None:
+            object.__setattr__(changed, name, fem.Constant(mesh, np.array(vector, dtype=default_scalar_type)))
+    return changed
 
 
 def along(x: Expr, direction: Direction) -> Expr:
@@ -81,6 +104,8 @@ class Ball:
     Raises:
         ValueError: A value is outside its range.
     """
+
+    directions: ClassVar[tuple[str, ...]] = ("axis",)
 
     radius: float
     axis: Direction | None = None
@@ -114,6 +139,8 @@ class FlatPunch:
     Raises:
         ValueError: A value is outside its range.
     """
+
+    directions: ClassVar[tuple[str, ...]] = ("push",)
 
     radius: float
     edge_radius: float
@@ -151,6 +178,8 @@ class Plane:
     Raises:
         ValueError: The normal is zero.
     """
+
+    directions: ClassVar[tuple[str, ...]] = ("normal",)
 
     normal: Direction
 

@@ -23,7 +23,7 @@ from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import Rubbing, SlipHistory, completed
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
-from cutsim.tools.shapes import Shape, ToolPath, check_directions
+from cutsim.tools.shapes import Shape, ToolPath, check_directions, with_constant_directions
 
 
 class Patch:
@@ -60,7 +60,7 @@ class Patch:
     ) -> None:
         self.surface = surface
         self.place = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
-        x = ufl.variable(self.place)
+        x, shape = ufl.variable(self.place), with_constant_directions(state.mesh, shape)
         normal = ufl.diff(shape.distance(x), x)
         self._contact = with_constants(state.mesh, contact)
         self._penetration = -shape.distance(self.place)

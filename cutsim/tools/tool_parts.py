@@ -3,11 +3,13 @@
 from collections.abc import Callable, Sequence
 
 import ufl
+from dolfinx.mesh import Mesh
 
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns
 from cutsim.fields.points import Values
 from cutsim.tools.pointed import Pointed
+from cutsim.tools.shapes import with_constant_directions
 from cutsim.tools.tool_contact import Patch, ToolContact
 
 #: Parts of a tool, from its foremost point upwards.
@@ -33,7 +35,7 @@ class ToolParts:
     def __init__(self, tools: Sequence[ToolContact], shape: Pointed, name: str = "tool_parts") -> None:
         self.name = name
         self._shaft = shape.shaft_height
-        self._books = [(patch, _evaluator(patch, shape)) for tool in tools for patch in tool.patches]
+        self._books = [(patch, _evaluator(tool.state.mesh, patch, shape)) for tool in tools for patch in tool.patches]
         none: _Books = {(quantity, part): 0.0 for quantity in _QUANTITIES for part in PARTS}
         self._known = tools[0].state.memory.value(name, none)
 
@@ -69,9 +71,9 @@ class ToolParts:
         return self._known.trial["work", part]
 
 
-def _evaluator(patch: Patch, shape: Pointed) -> Callable[[], dict[str, Values]]:
+def _evaluator(mesh: Mesh, patch: Patch, shape: Pointed) -> Callable[[], dict[str, Values]]:
     """Force densities against the push, and height above the foremost point."""
-    back = ufl.as_vector([-component for component in shape.push])
+    back = -ufl.as_vector(with_constant_directions(mesh, shape).push)
     friction = ufl.as_ufl(0.0) if patch.slip is None else ufl.dot(patch.slip.traction, back)
     return patch.surface.points.evaluator(
         {"pressure": ufl.dot(patch.thrust, back), "friction": friction, "height": ufl.dot(patch.place, back)}
