@@ -113,6 +113,11 @@ def test_audit_adds_up():
     assert set(audit.record()) == {"work_external", "energy_initial", "energy_closure"} | entries
 
 
+def test_audit_refuses_an_entry_that_it_does_not_have():
+    with pytest.raises(ValueError, match="name of an energy = 'strian' is not allowed: it must be one of strain, "):
+        EnergyAudit().advance(0.0, [{"strian": 1.0}])
+
+
 def test_audit_of_a_state_that_starts_with_energy():
     audit = EnergyAudit().start([{"kinetic": 3.0, "strain": 1.0}])
     assert audit.initial == 4.0

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from cutsim.base.checks import require
 from cutsim.base.terms import ENTRIES
 
 
@@ -40,10 +41,14 @@ class EnergyAudit:
         Args:
             work: External work of the step.
             energies: Contributions of the terms, totals since the start.
+
+        Raises:
+            ValueError: A contribution is no entry of the audit.
         """
         entries = dict.fromkeys(ENTRIES, 0.0)
         for contribution in energies:
             for name, value in contribution.items():
+                require("name of an energy", name, name in entries, "one of " + ", ".join(ENTRIES))
                 entries[name] += value
         external = self.external + work
         turnover = max(abs(external), sum(abs(v) for v in entries.values()))
