@@ -55,17 +55,17 @@ temperature = Temperature(state, cracked_space(domain.mesh, ("Lagrange", 1), fac
 # The interface is a crack without a bond: contact, with Coulomb's friction.  To have the same pressure everywhere, the
 # lower block is fixed at every node, and the upper one sits in a holder that leaves it free to be compressed only.
 
-from cutsim import Coulomb, Crack, CrackFriction, LinearElastic, Mechanics, Solid, Support
+from cutsim import Coulomb, Crack, LinearElastic, Mechanics, Solid, Support
 
 steel = LinearElastic(young=210e3, poisson=0.3)  # MPa
 body = Solid(state, steel, density=rho)
-crack = Crack(state, facets, lower, young=steel.young, name="contact", normal="reference")
-friction = CrackFriction(crack, Coulomb(mu, stiffness=penalty))
+rubbing = Coulomb(mu, stiffness=penalty)
+crack = Crack(state, facets, lower, young=steel.young, name="contact", normal="reference", friction=rubbing)
 depth = pressure * (h / (steel.bulk + 4 / 3 * steel.shear) + 1 / crack.contact.stiffness)
 drive = Support(state, upper, 0, lambda t: speed * max(t - start, 0.0), dim=3, corners=(start, slip))
 press = Support(state, domain.facets("top"), 1, lambda t: -depth * min(t / start, 1.0), name="press")
 holder = [Support(state, upper, 2, dim=3), *(Support(state, lower, axis, dim=3) for axis in range(3))]
-mechanics = Mechanics(state, [body, crack, friction], [drive, press, *holder])
+mechanics = Mechanics(state, [body, crack], [drive, press, *holder])
 
 # ## Heat
 #
@@ -76,7 +76,7 @@ from cutsim import ContactHeat, HeatBody, HeatTransfer, InterfaceHeat, ThermoMec
 
 properties = dict(capacity=c, conductivity=k, density=rho)
 blocks = [HeatBody(temperature, body=cells, name=n, **properties) for n, cells in (("lower", lower), ("upper", upper))]
-contact = InterfaceHeat(temperature, crack, ContactHeat(0.6, 0.2), friction, name="interface")  # γ⁺, γ⁻ [mW/(N K)]
+contact = InterfaceHeat(temperature, crack, ContactHeat(0.6, 0.2), name="interface")  # γ⁺, γ⁻ [mW/(N K)]
 problem = ThermoMechanics(mechanics, HeatTransfer(temperature, [*blocks, contact]))
 
 # ## Run

@@ -82,7 +82,7 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "Convection": good(temperature="@temperature", facets="@facets", coefficient=1.0, ambient=1.0, corners=(1.0,)),
     "Coulomb": good(mu=0.3, stiffness=1.0, viscosity=1.0, T_ref=1.0, T_damage=2.0),
     "Crack": good(state="@state", facets="@interface", plus="@plus", law=EXPONENTIAL, young=1.0, contact="@contact",
-                  allowed_penetration=0.1),
+                  friction=0.3, allowed_penetration=0.1),
     "CrackFriction": good(crack="@crack", law=cutsim.Coulomb(0.3), allowed_slip=0.1),
     "Drive": good(speed=1.0, entry_time=1.0, turning_depth=1.0),
     "DispersedFibres": good(direction=FIBRE, k1=1.0, k2=1.0, dispersion=0.1),

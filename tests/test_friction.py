@@ -40,6 +40,22 @@ def driven(path, law=LAW, gdim=2, bond=None, **options):
     return Mechanics(b.state, [crack, friction], supports), friction
 
 
+def test_a_crack_takes_a_coefficient_or_a_law():
+    """As tools and pairs do; the term that it makes is the one that can be written out."""
+    rows = []
+    for friction in (MU, Coulomb(MU), Coulomb(MU, NORMAL), None):
+        b = make_blocks()
+        crack = b.crack(None, contact=PenaltyContact(NORMAL), friction=friction)
+        terms = [crack] if friction else [crack, CrackFriction(crack, MU)]
+        supports = b.drive(b.lower, [0.0, 0.0], "base") + b.drive(b.upper, to_and_fro(0.1), "top")
+        rows.append(history(Mechanics(b.state, terms, supports), 3.0, StepControl.fixed(0.25)))
+    for other in rows[1:]:
+        assert rows[0].keys() == other.keys()
+        for name, column in rows[0].items():
+            np.testing.assert_array_equal(column, other[name], err_msg=name)
+    assert rows[0]["energy_friction"][-1] > 0
+
+
 def to_and_fro(far, gdim=2):
     """Press by DEPTH until t = 1, then slide to +far, −far and back to 0 until t = 5."""
 

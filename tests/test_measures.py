@@ -19,7 +19,7 @@ WIDE = {
     "bodies.solid.Solid.__init__": 11,
     "results.recording.Recording.__init__": 10,
     "analysis.mechanics.Mechanics.__init__": 10,
-    "interface.crack.Crack.__init__": 9,
+    "interface.crack.Crack.__init__": 10,
     "fields.laminate.laminate": 9,
 }
 

@@ -30,6 +30,7 @@ from cutsim.base.terms import (
     RateDependent,
     Term,
     offering,
+    with_companions,
 )
 from cutsim.base.verdict import CLOSURE
 from cutsim.bodies.inertia import Inertia
@@ -98,6 +99,7 @@ class Mechanics(Balance[Term, Support]):
         tolerances: Tolerances = TOLERANCES,
     ) -> None:
         require("terms", len(terms), len(terms) > 0, "at least one term")
+        terms = with_companions(terms)
         self.supports, self._observers = tuple(supports), tuple(observers)
         self.motion: Motion = QuasiStatic(state, terms)
         if analysis == "dynamic":
@@ -123,8 +125,7 @@ class Mechanics(Balance[Term, Support]):
         audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
         self._audit = state.memory.value("mechanics: audit", audit)
         self._rate_forces = state.memory.value("mechanics: rate forces", np.zeros(len(state.increment)))
-        self._begun = state.memory.value("mechanics: begun", False)
-        self._moved = state.memory.value("mechanics: moved", False)
+        self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
     @property
     def inertia(self) -> Inertia | None:

@@ -70,6 +70,11 @@ class Term:
         raise TypeError(f"{type(self).__name__} has to write its virtual work")
 
     @property
+    def companions(self) -> Sequence["Term"]:
+        """Further terms that come with this one."""
+        return ()
+
+    @property
     def assemblers(self) -> Sequence[Assembler]:
         """The forces of the term that are no form."""
         return ()
@@ -292,6 +297,11 @@ class Observer(Protocol):
 
 
 P = TypeVar("P")
+
+
+def with_companions(terms: Iterable[Term]) -> list[Term]:
+    """Terms, each with those that come with it."""
+    return [part for term in terms for part in (term, *term.companions)]
 
 
 def offering(parts: Iterable[Any], what: type[P]) -> list[P]:

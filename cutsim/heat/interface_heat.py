@@ -33,7 +33,7 @@ class InterfaceHeat(ExchangeTerm):
         temperature: The temperature, on a space that is cracked along the same facets.
         crack: The crack.
         law: Law of exchange between the faces.
-        friction: Friction on the crack, None if there is none.
+        friction: Friction on the crack; by default that which the crack was given.
         name: Name in messages and output; by default that of the crack.
 
     Attributes:
@@ -56,7 +56,7 @@ class InterfaceHeat(ExchangeTerm):
         super().__init__(temperature, name or crack.name)
         require("crack", crack.name, crack.state is temperature.state, "a crack made with the state of the temperature")
         require("temperature", crack.name, _is_cracked(temperature.space, crack), "on a space cracked along the crack")
-        self.crack, self.law, self.friction = crack, law, friction
+        self.crack, self.law, self.friction = crack, law, friction or crack.friction
         T = temperature.value
         self.exchange = HeatExchange(temperature, crack.points, law, T("+"), T("-"), self.name)
 

@@ -5,7 +5,7 @@ jump is δ = u⁻ − u⁺, the normal n points from '+' to '−', and the tract
 face: T·n > 0 pulls them together.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -13,7 +13,7 @@ import ufl
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
-from cutsim.base.checks import positive, require, require_number
+from cutsim.base.checks import nonnegative, positive, require, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
@@ -26,7 +26,9 @@ from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_faces import CrackFaces
+from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.doubts import doubt_law, doubt_penetration
+from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
 
 #: Fields of a crack for output.
@@ -46,6 +48,8 @@ class Crack(Term):
         young: Young's modulus of the softer neighbour, for the automatic penalty and the mesh check [stress].
         name: Name in messages and output.
         contact: Contact law of the closed crack; by default a penalty of 10 E/h.
+        friction: Friction law, or the coefficient of Coulomb's, None for none; it acts where the bond is broken. For
+            other options `CrackFriction` is a term of its own, beside a crack without this.
         allowed_penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
         normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
 
@@ -54,8 +58,8 @@ class Crack(Term):
         points: Its integration points, with the facets in the order of all per-facet arrays.
         history: What they remember.
         faces: Kinematics and tractions of the faces at a displacement.
+        friction: Friction of the faces, or None.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
-        size: Mean size of the facets along the crack, their shortest edge [length].
         normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
 
     Raises:
@@ -75,11 +79,14 @@ class Crack(Term):
         young: float,
         name: str = "crack",
         contact: PenaltyContact | None = None,
+        friction: FrictionLaw | float | None = None,
         allowed_penetration: float | None = None,
         normal: Literal["current", "reference"] = "current",
     ) -> None:
         require_number("young", young, positive)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
+        if not isinstance(friction, FrictionLaw):
+            require_number("friction", friction, nonnegative.or_none)
         self.name, self.state, self.law, self.young = name, state, law, young
         self._allowed_penetration = allowed_penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
@@ -87,7 +94,6 @@ class Crack(Term):
         self.points = FacetPoints(
             state.mesh, np.asarray(facets, dtype=np.int32), state.measures.interior(self.entities), interior=True
         )
-        self.size = self.points.mean(facet_size(state.mesh, self.points.facets))
         self.normal_size = self.points.mean(normal_size(state.mesh, self.points.facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
@@ -97,6 +103,17 @@ class Crack(Term):
         self.faces = CrackFaces(
             state, self.points, self.history, law, self.contact, current=normal == "current", augmented=augmented
         )
+        self.friction = CrackFriction(self, friction) if friction else None
+
+    @property
+    def size(self) -> float:
+        """Mean size of the facets along the crack, their shortest edge [length]. Collective."""
+        return self.points.mean(facet_size(self.state.mesh, self.points.facets))
+
+    @property
+    def companions(self) -> Sequence[Term]:
+        """The friction of the faces."""
+        return () if self.friction is None else (self.friction,)
 
     # -- virtual work ---------------------------------------------------------------------------------------------
 

@@ -1,6 +1,6 @@
 """Friction between the faces of a crack (docs/theory.md §3.3; thesis 4.50–4.55)."""
 
-from typing import Literal
+from typing import Literal, Protocol
 
 import ufl
 
@@ -9,15 +9,32 @@ from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
-from cutsim.fields.points import Values
+from cutsim.fields.points import FacetPoints, Surface, Values
+from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
-from cutsim.interface.crack import Crack
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack_faces import CrackFaces
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import Rubbing, SlipHistory, completed
 
 
+class Faced(Protocol):
+    """What friction needs of a crack."""
+
+    name: str
+    state: State
+    points: FacetPoints
+    contact: PenaltyContact
+    faces: CrackFaces
+
+    def surface(self, side: Literal["+", "-"]) -> Surface:
+        """One face of it."""
+
+
 class CrackFriction(Term):
     """Friction that resists the sliding of closed crack faces.
+
+    A crack that is given `friction=` makes this term by itself; it is written out for the options that only it has.
 
     The traction is kept in components along tangents that turn with the crack, so that it is objective.  Its limit
     comes from the contact pressure; by default it acts on the broken fraction D_t of the bond, beside the cohesive
@@ -43,7 +60,7 @@ class CrackFriction(Term):
     @checked
     def __init__(
         self,
-        crack: Crack,
+        crack: Faced,
         law: FrictionLaw | float,
         *,
         acts_on: Literal["broken", "contact", "tension"] = "broken",
@@ -73,7 +90,7 @@ class CrackFriction(Term):
     @property
     def entity_maps(self) -> EntityMaps:
         """Map from facets of the mesh to cells of the crack's submesh."""
-        return self.crack.entity_maps
+        return self.crack.points.entity_maps
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ t·(v⁻ − v⁺) dΓ₀; the traction acts as t on the '+' face."""
