@@ -191,6 +191,21 @@ def test_limit_on_closure_makes_steps_smaller():
     assert sum(r.cuts for r in reports) > 0
 
 
+class Stubborn(StepControl):
+    """A control that tries the same step for ever."""
+
+    def accept(self, report):
+        return "never"
+
+    def next(self, report):
+        return report.dt
+
+
+def test_a_control_has_to_shorten_a_rejected_step():
+    with pytest.raises(ValueError, match=r"control.next\(report\) = 0.1 is not allowed.*less than 0.1"):
+        run(opening_blocks(), 0.6, Stubborn(0.1, 0.1))
+
+
 def test_every_corner_is_met():
     """Corners of a support, of a load and of a path, though no multiple of the step; none is passed by rounding."""
     b = make_blocks()

@@ -341,6 +341,7 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
             return _accept(problem, control, replace(report, corner=end == corner), size)
         state.rollback()
         size, cuts = control.next(report), cuts + 1
+        require("control.next(report)", size, size < report.dt, f"less than {report.dt:.6g} after a rejected step")
         logger.info("step to %.6g rejected (%s); next try %.3g", end, report.refusal, size)
         if size < control.smallest:
             raise _no_step(problem, control, report)
