@@ -127,6 +127,9 @@ def test_the_parts_of_the_force_are_those_of_the_audit():
     assert np.diff(parts["shaft friction"][late]).min() > 0, "more and more of the shaft is in the body"
     np.testing.assert_allclose(parts["cutting"][-2:], 2 * np.pi * THREAD * TOUGHNESS, rtol=0.05)
     assert not parts["shaft friction"][parts["depth"] < 0.6].any(), "the shaft begins higher up"
+    for rounding in (-1e-15, 1e-15):  # of the last depth, which the second push reaches again
+        twice = history | {"depth": np.append(history["depth"][:-1], history["depth"].max() + rounding)}
+        np.testing.assert_allclose(force_parts(twice, 1.0, 0.2)["tip friction"], parts["tip friction"], rtol=1e-9)
     _, history = blade_twice(0.0)
     parts = force_parts(history, 1.0, 0.2)
     whole = np.sum([parts[n] for n in names], axis=0)

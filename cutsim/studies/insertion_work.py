@@ -226,6 +226,9 @@ class TwoInsertions:
 
 
 def _first_push(depth: Array) -> NDArray[np.intp]:
-    """Rows of the first push: the last one before it, then those in which the tool is deeper than ever before."""
-    before = np.flatnonzero(np.diff(np.maximum.accumulate(depth)) > 0)
+    """Rows of the first push: the last one before it, then those in which the tool is deeper than ever before.
+
+    A second push ends as deep as the first one but for rounding, which must not count.
+    """
+    before = np.flatnonzero(np.diff(np.maximum.accumulate(depth)) > 1e-12 * np.abs(depth).max())
     return np.concatenate([before[:1], before + 1])
