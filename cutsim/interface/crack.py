@@ -13,7 +13,7 @@ import ufl
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
-from cutsim.base.checks import nonnegative, positive, require, require_number
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
@@ -30,6 +30,7 @@ from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
+from cutsim.interface.slip import check_friction
 
 #: Fields of a crack for output.
 FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
@@ -85,8 +86,7 @@ class Crack(Term):
     ) -> None:
         require_number("young", young, positive)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
-        if not isinstance(friction, FrictionLaw):
-            require_number("friction", friction, nonnegative.or_none)
+        check_friction("friction", friction)
         self.name, self.state, self.law, self.young = name, state, law, young
         self._allowed_penetration = allowed_penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)

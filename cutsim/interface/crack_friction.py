@@ -4,7 +4,7 @@ from typing import Literal, Protocol
 
 import ufl
 
-from cutsim.base.checks import positive, require_number
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
@@ -15,7 +15,7 @@ from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_faces import CrackFaces
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import Rubbing, SlipHistory, completed
+from cutsim.interface.slip import Rubbing, SlipHistory, check_friction, completed
 
 
 class Faced(Protocol):
@@ -67,6 +67,8 @@ class CrackFriction(Term):
         allowed_slip: float | None = None,
         temperature: Temperature | None = None,
     ) -> None:
+        require("law", law, law is not None, "a friction law or a coefficient")
+        check_friction("law", law)
         require_number("allowed_slip", allowed_slip, positive.or_none)
         if acts_on == "tension":
             words = f"{crack.name}: open faces rub (friction on 'tension'); use it for comparison only"
@@ -84,7 +86,7 @@ class CrackFriction(Term):
             share=self._share,
             temperature=hotter,
         )
-        friction = completed("law", law, crack.contact.stiffness)
+        friction = completed(law, crack.contact.stiffness)
         self.slip = SlipHistory(crack.state, self.name, crack.points, friction, rubbing, tolerance=allowed_slip)
 
     @property

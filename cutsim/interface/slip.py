@@ -18,19 +18,24 @@ from cutsim.interface.friction import Coulomb, FrictionLaw
 _STICKS = 1e-9
 
 
-def completed(name: str, friction: FrictionLaw | float, stiffness: float) -> FrictionLaw:
+def check_friction(name: str, friction: FrictionLaw | float | None) -> None:
+    """Refuse what is neither a friction law nor the coefficient of Coulomb's, nor None.
+
+    Raises:
+        ValueError: It is something else, or a negative number.
+    """
+    if not isinstance(friction, FrictionLaw):
+        require_number(name, friction, nonnegative.or_none)
+
+
+def completed(friction: FrictionLaw | float, stiffness: float) -> FrictionLaw:
     """The law with a tangential penalty: its own, or that of the normal contact.
 
     Args:
-        name: Name of the parameter in messages.
         friction: A law, or the coefficient of Coulomb's.
         stiffness: Penalty of the normal contact [stress/length].
-
-    Raises:
-        ValueError: It is neither, or a negative number.
     """
     if not isinstance(friction, FrictionLaw):
-        require_number(name, friction, nonnegative)
         return Coulomb(float(friction), stiffness)
     if isinstance(friction, Coulomb) and friction.stiffness is None:
         return replace(friction, stiffness=stiffness)

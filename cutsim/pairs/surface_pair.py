@@ -16,7 +16,7 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import completed
+from cutsim.interface.slip import check_friction, completed
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface
 from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.partners import PairKinematics
@@ -84,6 +84,7 @@ class SurfacePair(Term):
         name: str = "pair",
     ) -> None:
         require_number("young", young, positive)
+        check_friction("friction", friction)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
         require_number("allowed_slip", allowed_slip, positive.or_none)
         require_number("search", search, positive.or_none)
@@ -99,7 +100,7 @@ class SurfacePair(Term):
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
             doubt_law(state.verdict, name, law, young, sizes[0])
-        rubbing = completed("friction", friction, self.contact.stiffness) if friction else None
+        rubbing = completed(friction, self.contact.stiffness) if friction else None
         laws = PairLaws(law, self.contact, rubbing, allowed_penetration, allowed_slip)
         surfaces = [OuterSurface(state.V, p.facets) for p in points]
         self.facets = tuple(p.facets for p in points)

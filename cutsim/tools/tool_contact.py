@@ -20,7 +20,7 @@ from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import Rubbing, SlipHistory, completed
+from cutsim.interface.slip import Rubbing, SlipHistory, check_friction, completed
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import Shape, ToolPath, check_directions, with_constant_directions
@@ -162,11 +162,12 @@ class ToolContact(RigidTool):
         temperature: Temperature | None = None,
         name: str = "tool",
     ) -> None:
+        check_friction("friction", friction)
         super().__init__(state, path, name)
         require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
         check_directions(shape, state.mesh.geometry.dim)
         self.shape, self.contact, self.friction = shape, contact, friction
-        law = completed("friction", friction, contact.stiffness) if friction else None
+        law = completed(friction, contact.stiffness) if friction else None
         self.symmetric = law is None
         self.patches = tuple(Patch(state, name, s, shape, self.position, contact, law, temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))

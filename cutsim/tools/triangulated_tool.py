@@ -18,7 +18,7 @@ from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import SlipHistory, completed
+from cutsim.interface.slip import SlipHistory, check_friction, completed
 from cutsim.pairs.outer_surface import OuterSurface
 from cutsim.pairs.overlap import inside_surface
 from cutsim.pairs.pair_law import PairLaws
@@ -111,6 +111,7 @@ class TriangulatedTool(RigidTool):
         search: float | None = None,
         name: str = "tool",
     ) -> None:
+        check_friction("friction", friction)
         super().__init__(state, path, name)
         gdim = state.mesh.geometry.dim
         require_number("search", search, positive.or_none)
@@ -123,7 +124,7 @@ class TriangulatedTool(RigidTool):
         kinematics = PairKinematics(
             state.memory, name, slave, master, small_sliding=False, search=search or size, size=size
         )
-        law = completed("friction", friction, contact.stiffness) if friction else None
+        law = completed(friction, contact.stiffness) if friction else None
         laws = PairLaws(None, contact, law, None, None)
         self.touch = _Touch(state, name, points, kinematics, laws, weight=1.0)
 
