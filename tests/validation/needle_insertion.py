@@ -169,17 +169,16 @@ def plot(out: Path, cut: Insertion, history: History, parts: History) -> None:
     labels = {"xlabel": "depth of the tip [mm]", "ylabel": "force [N]"}
     plot_parts(out / "parts.png", parts["depth"], stack, parts["force"], title="What the force is spent on", **labels)
     time = history["time"]
-    down = cut.time_of(float(history["depth"].max()))
-    up = down if cut.motion.turning_depth is None else cut.time_of(cut.motion.start_depth, 2)
+    turn = cut.motion.turning_depth
+    down = cut.time_of(float(history["depth"].max()) if turn is None else turn)
+    up = down if turn is None else cut.time_of(cut.motion.start_depth, 2)
     legs = {"-": time <= down, ":": (time >= down) & (time <= up), "--": time >= up}  # in, back, in again
     curves = [
         Curve(history["depth"][leg], history[column][leg], place if style == "-" else "", f"C{i}{style}")
         for i, (place, column) in enumerate({"needle": "force", "tip": "tip_force", "shaft": "shaft_force"}.items())
         for style, leg in legs.items()
     ]
-    title = "Force on tip and shaft" + (
-        "" if cut.motion.turning_depth is None else ": in, back (dotted) and in again (dashed)"
-    )
+    title = "Force on tip and shaft" + ("" if turn is None else ": in, back (dotted) and in again (dashed)")
     plot_curves(out / "force.png", curves, title=title, **labels)
     whole = {n: v * cut.symmetry_factor if n.startswith(("work", "energy")) else v for n, v in history.items()}
     whole["energy_closure"] = history["energy_closure"]
