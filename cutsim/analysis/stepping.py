@@ -399,7 +399,7 @@ def begin(problem: Problem, end: float) -> None:
 
 
 def _drift(problem: Problem) -> float:
-    """What the books miss by the trial step, over the largest turnover; nothing while there was none."""
+    """What the energy audit misses by the trial step, over the largest turnover; nothing while there was none."""
     before, after = problem.audit, problem.trial_audit
     return abs(after.gap - before.gap) / after.scale if before.scale > 0 else 0.0
 

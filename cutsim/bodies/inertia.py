@@ -33,7 +33,7 @@ Velocity = Callable[[NDArray[np.float64]], NDArray[np.float64]] | Sequence[float
 
 
 @dataclass(frozen=True)
-class _Books:
+class _Known:
     """Inertia forces M a on owned dofs and energies at the end of a step."""
 
     forces: Array
@@ -81,7 +81,7 @@ class Inertia(Term):
         self._predicted = fem.Function(state.V)
         # c/(β Δt²); zero until the first step begins
         self._weight = fem.Constant(state.mesh, default_scalar_type(0.0))
-        self._books = state.memory.value("inertia", _Books(np.zeros(len(state.increment))))
+        self._known = state.memory.value("inertia", _Known(np.zeros(len(state.increment))))
 
     # -- start ----------------------------------------------------------------------------------------------------
 
@@ -139,9 +139,9 @@ class Inertia(Term):
         for field, remembered in ((self.velocity, self._velocity), (self.acceleration, self._acceleration)):
             field.x.scatter_forward()
             remembered.commit()
-        self._books.set(_Books(self.mass.times(a.array), self.mass.kinetic(self.velocity.x.array)))
+        self._known.set(_Known(self.mass.times(a.array), self.mass.kinetic(self.velocity.x.array)))
         self._started.set(True)
-        return static + self._books.committed.forces
+        return static + self._known.committed.forces
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
@@ -171,17 +171,17 @@ class Inertia(Term):
         s = self.scheme
         # R₀ is old − M a₀
         weights = s.alpha_f / (1 - s.alpha_f), (s.alpha_m - s.alpha_f) / (1 - s.alpha_f)
-        return weights[0] * old + weights[1] * self._books.committed.forces
+        return weights[0] * old + weights[1] * self._known.committed.forces
 
     def evaluate(self) -> None:
         """Velocity, acceleration and their energies. Collective."""
-        s, dt, old = self.scheme, self._dt, self._books.committed
+        s, dt, old = self.scheme, self._dt, self._known.committed
         a, v = self.acceleration.x.array, self.velocity.x.array
         a[:] = (self.state.u.x.array - self._predicted.x.array) / (s.beta * dt**2)
         v[:] = self._velocity.committed + dt * ((1 - s.gamma) * self._acceleration.committed + s.gamma * a)
         forces, kinetic = self.mass.times(a), self.mass.kinetic(self.velocity.x.array)
         work = self._dot(0.5 * (forces + old.forces), self.state.increment)
-        self._books.trial = _Books(forces, kinetic, old.numerical + work - (kinetic - old.kinetic))
+        self._known.trial = _Known(forces, kinetic, old.numerical + work - (kinetic - old.kinetic))
 
     def balance(self, solved: Array, old: Array, supported: Callable[[Array], Array]) -> Array:
         """Forces R + M a at the end of the step; call after `evaluate`. Collective.
@@ -194,16 +194,16 @@ class Inertia(Term):
             old: Forces R + M a at the start of the step.
             supported: Gives the part of owned forces that supports hold.
         """
-        s, books = self.scheme, self._books.trial
-        forces = solved - self.history(old) + (s.alpha_m - s.alpha_f) / (1 - s.alpha_f) * books.forces
+        s, now = self.scheme, self._known.trial
+        forces = solved - self.history(old) + (s.alpha_m - s.alpha_f) / (1 - s.alpha_f) * now.forces
         mean = 0.5 * (forces + old)
         work = self._dot(mean - supported(mean), self.state.increment)
-        self._books.trial = _Books(books.forces, books.kinetic, books.numerical - work)
+        self._known.trial = _Known(now.forces, now.kinetic, now.numerical - work)
         return forces
 
     def energies(self) -> dict[str, float]:
         """Kinetic energy ½ v·M v, and what the scheme has dissipated so far."""
-        return {"kinetic": self._books.trial.kinetic, "numerical": self._books.trial.numerical}
+        return {"kinetic": self._known.trial.kinetic, "numerical": self._known.trial.numerical}
 
     def momentum(self) -> Array:
         """Linear momentum, one number a component [force·time]. Collective."""

@@ -16,7 +16,7 @@ from cutsim.tools.tool_contact import Patch, ToolContact
 PARTS = ("tip", "shaft")
 
 _QUANTITIES = ("force", "friction", "work")
-_Books = dict[tuple[str, str], float]
+_Parts = dict[tuple[str, str], float]
 
 
 class ToolParts:
@@ -35,14 +35,14 @@ class ToolParts:
     def __init__(self, tools: Sequence[ToolContact], shape: Pointed, name: str = "tool_parts") -> None:
         self.name = name
         self._shaft = shape.shaft_height
-        self._books = [(patch, _evaluator(tool.state.mesh, patch, shape)) for tool in tools for patch in tool.patches]
-        none: _Books = {(quantity, part): 0.0 for quantity in _QUANTITIES for part in PARTS}
+        self._patches = [(patch, _evaluator(tool.state.mesh, patch, shape)) for tool in tools for patch in tool.patches]
+        none: _Parts = {(quantity, part): 0.0 for quantity in _QUANTITIES for part in PARTS}
         self._known = tools[0].state.memory.value(name, none)
 
     def evaluate(self) -> None:
         """Forces of the trial state and work up to it. Collective."""
         total = {key: value if key[0] == "work" else 0.0 for key, value in self._known.committed.items()}
-        for patch, evaluate in self._books:
+        for patch, evaluate in self._patches:
             now, points = evaluate(), patch.surface.points
             densities = {
                 "force": now["pressure"] + now["friction"],
