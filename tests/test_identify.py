@@ -25,7 +25,7 @@ from cutsim.identify import (
 )
 from cutsim.identify.fitting import Fit, fit_model
 from cutsim.identify.indentation import _layer_factor
-from cutsim.identify.response import Response
+from cutsim.identify.response import HomogeneousResponse
 from cutsim.materials.fibres import DispersedFibres, Reinforced
 from cutsim.materials.library import material
 from helpers.materials import ISOTROPIC, PATHS, energy, incompressible, name, nominal
@@ -242,9 +242,9 @@ def test_side_faces_of_a_fibrous_solid_are_free():
 def test_bad_responses_are_refused():
     solid = NeoHookean(1.0, 0.4)
     with pytest.raises(ValueError, match=r"path = 'shear' .* uniaxial, equibiaxial, pure shear"):
-        Response(solid, [("shear", [1.0])])
+        HomogeneousResponse(solid, [("shear", [1.0])])
     with pytest.raises(ValueError, match=r"smallest stretch = .*> 0"):
-        Response(solid, [("uniaxial", [1.0, 0.0])])
+        HomogeneousResponse(solid, [("uniaxial", [1.0, 0.0])])
     with pytest.raises(ValueError, match="lowest, highest"):
         unstable_stretches(solid, 2.0, 1.0)
 
@@ -254,7 +254,7 @@ def test_drucker_stability():
     solid = IsochoricNeoHookean.from_moduli(0.7, 9.0)
     assert unstable_stretches(solid, 0.2, 5.0) == {}
     # ∂²W/∂e² at rest: G [[4, 2], [2, 4]]
-    assert Response(solid, [("uniaxial", [1.0])]).modulus({})[0] == pytest.approx(2 * 0.7, rel=1e-12)
+    assert HomogeneousResponse(solid, [("uniaxial", [1.0])]).modulus({})[0] == pytest.approx(2 * 0.7, rel=1e-12)
     softening = substituted(Yeoh(0.3, 0.01, 0.0, 4.0), {"c2": -0.05})
     span = unstable_stretches(softening, 1.0, 3.0)["uniaxial"]
     stretch = np.linspace(1.0, span[0] * 0.98, 200)
@@ -316,7 +316,7 @@ TRIALS = {
 def test_intervals_hold_what_they_promise(case):
     """With noise of 2 % of the largest stress each number lies in its 95 % interval in at least 90 of 100 trials."""
     solid, guess, paths = TRIALS[case]
-    response = Response(solid, [(path, np.linspace(*RANGES[path], 25)) for path in paths])
+    response = HomogeneousResponse(solid, [(path, np.linspace(*RANGES[path], 25)) for path in paths])
     exact = response.stress({})
     weights = np.repeat(1 / np.abs(exact.reshape(-1, 25)).max(axis=1), 25)
     rng, inside, widths, doubts = np.random.default_rng(1), Counter(), Counter(), 0

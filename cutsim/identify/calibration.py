@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.parameters import numbers, with_numbers
 from cutsim.base.signatures import checked
-from cutsim.identify.fitting import Bounds, Fit, Values, fit_model, require_pairs
-from cutsim.identify.response import Response, nominal_stress, unstable_stretches
+from cutsim.identify.fitting import Bounds, Fit, Parameters, fit_model, require_pairs
+from cutsim.identify.response import HomogeneousResponse, nominal_stress, unstable_stretches
 from cutsim.materials.elastic import Material
 from cutsim.results.plots import Curve, plot_curves
 
@@ -120,9 +120,9 @@ def fit_material(
     start = _varied(guess, vary)
     require("tests", len(tests), len(tests) > 0, "at least one test")
     require("offsets", offsets, set(offsets) <= set(_ZEROS), "of " + ", ".join(_ZEROS))
-    response = Response(guess, [(test.path, test.stretch) for test in tests])
+    response = HomogeneousResponse(guess, [(test.path, test.stretch) for test in tests])
 
-    def model(values: Values) -> NDArray[np.float64]:
+    def model(values: Parameters) -> NDArray[np.float64]:
         stretch = np.concatenate([_carried(test, values, i) for i, test in enumerate(tests)])
         shown = [np.full(len(test.stretch), values.get(f"stress_offset[{i}]", 0.0)) for i, test in enumerate(tests)]
         return response.stress({name: values[name] for name in start}, stretch) + np.concatenate(shown)
@@ -144,7 +144,7 @@ def fit_material(
     return MaterialFit(material, fit, tuple(tests), unstable)
 
 
-def _carried(test: StressTest, values: Values, number: int) -> NDArray[np.float64]:
+def _carried(test: StressTest, values: Parameters, number: int) -> NDArray[np.float64]:
     """Stretches of the specimen with the offset of a test; while a specimen in tension or compression is slack, 1."""
     measured = np.asarray(test.stretch, dtype=np.float64)
     stretch = np.maximum(measured + values.get(f"strain_offset[{number}]", 0.0), _LEAST)
@@ -153,7 +153,7 @@ def _carried(test: StressTest, values: Values, number: int) -> NDArray[np.float6
     return np.minimum(stretch, 1.0) if measured.max() <= 1 else stretch
 
 
-def _corrected(test: StressTest, values: Values, number: int) -> StressTest:
+def _corrected(test: StressTest, values: Parameters, number: int) -> StressTest:
     return replace(
         test,
         stretch=_carried(test, values, number),
@@ -161,10 +161,10 @@ def _corrected(test: StressTest, values: Values, number: int) -> StressTest:
     )
 
 
-def _varied(guess: Material, vary: Sequence[str]) -> Values:
+def _varied(guess: Material, vary: Sequence[str]) -> Parameters:
     """First guesses of the numbers that are to be fitted."""
     known = numbers(guess)
-    start: Values = {}
+    start: Parameters = {}
     for name in vary:
         matching = {n: v for n, v in known.items() if n == name or n.startswith((f"{name}[", f"{name}."))}
         require("vary", name, bool(matching), "one of " + ", ".join(known))

@@ -18,7 +18,8 @@ logger = logging.getLogger(__name__)
 _UNLIKELY = 0.01
 #: Residuals, relative to the data, that are no noise but rounding and tolerances.
 _ROUNDING = 1e-6
-Values = dict[str, float]
+#: Values of parameters by name.
+Parameters = dict[str, float]
 Bounds = Mapping[str, tuple[float, float]]
 
 
@@ -33,7 +34,7 @@ class Fit:
         residuals: Model less measurement, as weighted.
     """
 
-    values: Values
+    values: Parameters
     covariance: NDArray[np.float64]
     measured: NDArray[np.float64]
     residuals: NDArray[np.float64]
@@ -110,8 +111,8 @@ class Fit:
 
 
 def fit_model(
-    model: Callable[[Values], NDArray[np.float64]],
-    guess: Values,
+    model: Callable[[Parameters], NDArray[np.float64]],
+    guess: Parameters,
     measured: ArrayLike,
     *,
     weights: ArrayLike = 1.0,
@@ -148,7 +149,7 @@ def fit_model(
     return finished(guess, found.x, found.jac, weights * measured, found.fun, limits)
 
 
-def require_problem(guess: Values, count: int, bounds: Bounds | None) -> None:
+def require_problem(guess: Parameters, count: int, bounds: Bounds | None) -> None:
     """Refuse a problem of least squares that makes no sense.
 
     Args:
@@ -190,14 +191,14 @@ def require_pairs(first: str, x: ArrayLike, second: str, y: ArrayLike) -> None:
         require(f"indices of {name} that are not finite", bad.tolist(), len(bad) == 0, "none")
 
 
-def limits_of(guess: Values, bounds: Bounds | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def limits_of(guess: Parameters, bounds: Bounds | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Lower and upper bounds of all parameters, in their order."""
     pairs = np.array([(bounds or {}).get(name, (-np.inf, np.inf)) for name in guess], dtype=np.float64)
     return pairs[:, 0], pairs[:, 1]
 
 
 def finished(
-    guess: Values,
+    guess: Parameters,
     x: NDArray[np.float64],
     jacobian: NDArray[np.float64],
     measured: NDArray[np.float64],

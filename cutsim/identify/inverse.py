@@ -21,12 +21,13 @@ from scipy import optimize
 from cutsim.analysis.stepping import StepError
 from cutsim.base.checks import between, count, require, require_number
 from cutsim.base.signatures import checked
-from cutsim.identify.fitting import Bounds, Fit, Values, finished, limits_of, require_pairs, require_problem
+from cutsim.identify.fitting import Bounds, Fit, Parameters, finished, limits_of, require_pairs, require_problem
 from cutsim.results.progress import Progress
 
 logger = logging.getLogger(__name__)
-Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
-Simulation = Callable[[Values], tuple[ArrayLike, ArrayLike]]
+#: Abscissae and ordinates that a simulation gave.
+SimulatedCurve = tuple[NDArray[np.float64], NDArray[np.float64]]
+Simulation = Callable[[Parameters], tuple[ArrayLike, ArrayLike]]
 Vector = NDArray[np.float64]
 
 #: Way back, in parts of the range of the abscissae, up to which it is noise.
@@ -54,12 +55,14 @@ class Evaluations:
     ) -> None:
         self._attempt, self._mapping, self._comm = partial(_attempt, simulate), mapping, comm
         self._store = None if store is None else Path(store)
-        self._curves: dict[tuple[Any, ...], Curve | None] = comm.bcast(self._read() if comm.rank == 0 else None)
+        self._curves: dict[tuple[Any, ...], SimulatedCurve | None] = comm.bcast(
+            self._read() if comm.rank == 0 else None
+        )
 
     def __len__(self) -> int:
         return len(self._curves)
 
-    def __call__(self, points: Sequence[Values]) -> list[Curve | None]:
+    def __call__(self, points: Sequence[Parameters]) -> list[SimulatedCurve | None]:
         """Curves at several points, None where the simulation found no equilibrium; known ones are not run again."""
         new = {_key(values): values for values in points if _key(values) not in self._curves}
         for values, curve in zip(new.values(), self._mapping(self._attempt, list(new.values())), strict=True):
@@ -68,7 +71,7 @@ class Evaluations:
                 self._write(values, curve)
         return [self._curves[_key(values)] for values in points]
 
-    def _read(self) -> dict[tuple[Any, ...], Curve | None]:
+    def _read(self) -> dict[tuple[Any, ...], SimulatedCurve | None]:
         if self._store is None or not self._store.exists():
             return {}
         text = self._store.read_text(encoding="utf-8")
@@ -78,7 +81,7 @@ class Evaluations:
         rows = [json.loads(line) for line in complete.splitlines()]
         return {_key(row["parameters"]): row["curve"] and tuple(map(np.array, row["curve"])) for row in rows}
 
-    def _write(self, values: Values, curve: Curve | None) -> None:
+    def _write(self, values: Parameters, curve: SimulatedCurve | None) -> None:
         if self._store is None:
             return
         self._store.parent.mkdir(parents=True, exist_ok=True)
@@ -90,7 +93,7 @@ class Evaluations:
 @checked
 def fit_simulation(
     simulate: Simulation,
-    guess: Values,
+    guess: Parameters,
     x: ArrayLike,
     y: ArrayLike,
     *,
@@ -167,7 +170,7 @@ class _Problem:
     """
 
     def __init__(
-        self, known: Evaluations, guess: Values, x: Vector, y: Vector, bounds: Bounds | None, step: float,
+        self, known: Evaluations, guess: Parameters, x: Vector, y: Vector, bounds: Bounds | None, step: float,
         progress: Progress,
     ) -> None:  # fmt: skip
         self._known, self._names, self._x, self._y, self._progress = known, list(guess), x, y, progress
@@ -198,7 +201,7 @@ class _Problem:
         base, *moved = self.at([point, *(point + np.diag(steps))])
         return np.stack([(r - base) / h for r, h in zip(moved, steps, strict=True)], axis=1)
 
-    def _residuals(self, curve: Curve | None) -> Vector:
+    def _residuals(self, curve: SimulatedCurve | None) -> Vector:
         if curve is None:
             return np.full(len(self._y), _FAILURE * np.abs(self._y).max())
         x, y = curve
@@ -265,7 +268,7 @@ def _ended(point: Vector, success: bool, message: str) -> Vector:
     return point
 
 
-def _attempt(simulate: Simulation, values: Values) -> Curve | None:
+def _attempt(simulate: Simulation, values: Parameters) -> SimulatedCurve | None:
     """A curve, or None where there is no equilibrium."""
     try:
         x, y = simulate(values)
@@ -275,5 +278,5 @@ def _attempt(simulate: Simulation, values: Values) -> Curve | None:
     return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
 
 
-def _key(values: Values) -> tuple[Any, ...]:
+def _key(values: Parameters) -> tuple[Any, ...]:
     return tuple(values.items())

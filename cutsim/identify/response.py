@@ -24,7 +24,7 @@ PATHS = {"uniaxial": -0.5, "equibiaxial": 1.0, "pure shear": 0.0}
 _ITERATIONS, _LARGEST, _ACCURATE = 50, 0.1, 1e-10
 
 
-class Response:
+class HomogeneousResponse:
     """Nominal stress of a material in some tests, compiled once for all values of its parameters.
 
     Fibres and axes of an anisotropic material have to lie such that the block does not shear.
@@ -117,7 +117,7 @@ def nominal_stress(material: Material, path: str, stretch: ArrayLike) -> NDArray
     Raises:
         ValueError: The path is unknown or a stretch is not positive.
     """
-    return Response(material, [(path, stretch)]).stress({})
+    return HomogeneousResponse(material, [(path, stretch)]).stress({})
 
 
 def unstable_stretches(material: Material, lowest: float, highest: float) -> dict[str, tuple[float, float]]:
@@ -138,6 +138,6 @@ def unstable_stretches(material: Material, lowest: float, highest: float) -> dic
     """
     require("lowest, highest", (lowest, highest), 0 < lowest < highest, "positive and in this order")
     stretch = np.geomspace(lowest, highest, 201)
-    moduli = Response(material, [(path, stretch) for path in PATHS]).modulus({}).reshape(len(PATHS), -1)
+    moduli = HomogeneousResponse(material, [(path, stretch) for path in PATHS]).modulus({}).reshape(len(PATHS), -1)
     unstable = {path: stretch[modulus <= 0] for path, modulus in zip(PATHS, moduli, strict=True)}
     return {path: (float(found[0]), float(found[-1])) for path, found in unstable.items() if len(found)}

@@ -13,11 +13,11 @@ from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.history import InterfaceHistory
-from cutsim.interface.modified_contact import Response, respond
+from cutsim.interface.modified_contact import InterfaceResponse, respond
 
 
 @dataclass(frozen=True)
-class CrackResponse(Response):
+class CrackResponse(InterfaceResponse):
     """Response of a crack at a displacement: kinematics and tractions.
 
     Attributes:

@@ -16,7 +16,7 @@ _REST = 1e-12
 
 
 @dataclass(frozen=True)
-class Response:
+class InterfaceResponse:
     """Symbolic response of the law to an opening and a slide at an integration point.
 
     Attributes:
@@ -47,7 +47,7 @@ def respond(
     memory: Expr,
     multiplier: Expr = 0.0,
     fade: Expr = 1.0,
-) -> Response:
+) -> InterfaceResponse:
     """Penalty contact where the gap is closed, a cohesive law with irreversible damage where it is open.
 
     Args:
@@ -64,11 +64,13 @@ def respond(
     pressure = fade * contact.pressure(depth)
     if law is None:
         none, whole = ufl.as_ufl(0.0), ufl.as_ufl(1.0)
-        return Response(safe_norm(slide, _REST), (none, none), none, 0 * slide, depth, pressure, (whole, whole))
+        return InterfaceResponse(
+            safe_norm(slide, _REST), (none, none), none, 0 * slide, depth, pressure, (whole, whole)
+        )
     sliding = safe_norm(slide, _REST * law.opening)
     envelope = law.secants(opening, sliding)
     k_n, k_t = (_smaller(k, memory[i]) for i, k in enumerate(envelope))
-    return Response(sliding, (k_n, k_t), k_n * opening, k_t * slide, depth, pressure, law.damage(k_n, k_t))
+    return InterfaceResponse(sliding, (k_n, k_t), k_n * opening, k_t * slide, depth, pressure, law.damage(k_n, k_t))
 
 
 def _smaller(secant: Expr, memory: Expr) -> Expr:

@@ -8,7 +8,7 @@ import ufl
 from cutsim.base.checks import between, finite, positive, require, require_number, require_numbers
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
-from cutsim.materials.directions import Direction, require_axes, require_direction, stretches_in, unit
+from cutsim.materials.directions import Direction, normalised, require_axes, require_direction, stretches_in
 from cutsim.materials.elastic import WithoutPlaneStress, engineering_constants
 
 _AXES: tuple[Direction, Direction] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
@@ -64,7 +64,7 @@ class TransverselyIsotropic(WithoutPlaneStress):
         axial = self.axial_young * (1 - self.poisson) / self._definite
         alpha, beta = shear - self.axial_shear, 0.5 * (coupling - lame)
         gamma = (axial + lame - 2 * coupling + 2 * shear - 4 * self.axial_shear) / 8
-        a = unit(self.direction)
+        a = normalised(self.direction)
         Ca = F.T * (F * a)
         I4, I5, log_J = ufl.dot(a, Ca) - 1, ufl.dot(Ca, Ca) - 1, ufl.ln(ufl.det(F))
         matrix = 0.5 * shear * (ufl.inner(F, F) - 3) - shear * log_J

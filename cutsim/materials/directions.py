@@ -41,11 +41,11 @@ def piecewise_direction(mesh: Mesh, regions: Mapping[tuple[float, ...], NDArray[
 
 def squared_stretch(F: Expr, direction: Direction) -> Expr:
     """Squared stretch I₄ = a·Ca along a direction a of the reference configuration."""
-    image = F * unit(direction)
+    image = F * normalised(direction)
     return ufl.dot(image, image)
 
 
-def unit(direction: Direction) -> Expr:
+def normalised(direction: Direction) -> Expr:
     """A direction as a UFL vector of length one and three components."""
     components = list(direction) if isinstance(direction, tuple) else [direction[i] for i in range(len(direction))]
     a = ufl.as_vector(components + [0.0] * (3 - len(components)))
@@ -54,7 +54,7 @@ def unit(direction: Direction) -> Expr:
 
 def stretches_in(F: Expr, axes: tuple[Direction, Direction]) -> list[list[Expr]]:
     """Components of C = FᵀF along two directions at right angles and their vector product."""
-    first, second = (unit(a) for a in axes)
+    first, second = (normalised(a) for a in axes)
     images = [F * e for e in (first, second, ufl.cross(first, second))]
     upper = {(i, j): ufl.dot(images[i], images[j]) for i in range(3) for j in range(i, 3)}
     return [[upper[min(i, j), max(i, j)] for j in range(3)] for i in range(3)]

@@ -15,10 +15,11 @@ from cutsim.base.checks import between, require, require_number
 from cutsim.studies.insertion import Insertion
 from cutsim.tools.tool_parts import PARTS
 
-History = Mapping[str, Array]
+#: Columns of a run by name, as `cutsim.results.output.read_history` gives them.
+HistoryOutput = Mapping[str, Array]
 
 
-def audited_toughness(history: History, start: float, end: float, symmetry_factor: float) -> float:
+def audited_toughness(history: HistoryOutput, start: float, end: float, symmetry_factor: float) -> float:
     """Toughness as the rest of the energy audit, (∫F ds − ΔE − losses)/ΔA: a check of the audit [force/length].
 
     ΔE is what body and contact hold, losses are friction and viscosity, and ΔA, the growth of the column `cut`, counts
@@ -93,7 +94,7 @@ class SteadyCut:
         return self.force * self.way * (1 + self.force / stiffness / 2) / self.swept
 
     @classmethod
-    def of(cls, history: History, start: float, end: float) -> "SteadyCut":
+    def of(cls, history: HistoryOutput, start: float, end: float) -> "SteadyCut":
         """Evaluate the first push between two depths.
 
         Args:
@@ -117,7 +118,7 @@ class SteadyCut:
         return cls(force, float(second - first) / force, end - start, swept)
 
 
-def force_parts(history: History, symmetry_factor: float, window: float) -> dict[str, Array]:
+def force_parts(history: HistoryOutput, symmetry_factor: float, window: float) -> dict[str, Array]:
     """The force of the first push by what its work is spent on, in means over windows of the depth.
 
     Between two depths ∫F ds is what body and contact take up, what the crack takes up and dissipates, friction on tip
@@ -194,7 +195,7 @@ class TwoInsertions:
         return TwoInsertions(*(getattr(self, name) - getattr(shallower, name) for name in names))
 
     @classmethod
-    def of(cls, history: History, cut: Insertion) -> "TwoInsertions":
+    def of(cls, history: HistoryOutput, cut: Insertion) -> "TwoInsertions":
         """Evaluate a run to the end of the second push.
 
         Args:

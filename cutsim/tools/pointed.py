@@ -14,7 +14,7 @@ from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.interface.contact import PenaltyContact
-from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit
+from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit_vector
 
 
 def _pointed(across: Expr, above: Expr, half_angle: float, width: float, radius: float) -> Expr:
@@ -125,10 +125,10 @@ class Pointed(ABC):
         require_number("tip_radius", self.tip_radius, positive)
         require_number(width, self.width, above(self.tip_radius, "tip_radius"))
         require("side", self.side, self.side in (-1, 0, 1), "-1, 0 or 1")
-        object.__setattr__(self, "push", unit("push", self.push))
+        object.__setattr__(self, "push", unit_vector("push", self.push))
         require("lateral", self.lateral, self.side == 0 or self.lateral is not None, "a direction, to halve the tool")
         if self.lateral is not None:
-            object.__setattr__(self, "lateral", unit("lateral", self.lateral))
+            object.__setattr__(self, "lateral", unit_vector("lateral", self.lateral))
             alike = len(self.lateral) == len(self.push)
             require("lateral", self.lateral, alike, f"of {len(self.push)} components, as push has")
             inner = float(np.dot(self.push, self.lateral))

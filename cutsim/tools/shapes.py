@@ -39,7 +39,7 @@ class Shape(Protocol):
 AnyShape = TypeVar("AnyShape", bound=Shape)
 
 
-def unit(name: str, vector: Direction) -> Direction:
+def unit_vector(name: str, vector: Direction) -> Direction:
     """Unit vector along one that the user gave under a name."""
     require_numbers(name, vector)
     norm = float(np.linalg.norm(vector))
@@ -113,7 +113,7 @@ class Ball:
     def __post_init__(self) -> None:
         require_number("radius", self.radius, positive)
         if self.axis is not None:
-            object.__setattr__(self, "axis", unit("axis", self.axis))
+            object.__setattr__(self, "axis", unit_vector("axis", self.axis))
 
     @property
     def resolution(self) -> float:
@@ -149,7 +149,7 @@ class FlatPunch:
     def __post_init__(self) -> None:
         require_number("edge_radius", self.edge_radius, positive)
         require_number("radius", self.radius, above(self.edge_radius, "edge_radius"))
-        object.__setattr__(self, "push", unit("push", self.push))
+        object.__setattr__(self, "push", unit_vector("push", self.push))
 
     @property
     def resolution(self) -> float:
@@ -184,7 +184,7 @@ class Plane:
     normal: Direction
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "normal", unit("normal", self.normal))
+        object.__setattr__(self, "normal", unit_vector("normal", self.normal))
 
     @property
     def resolution(self) -> float:

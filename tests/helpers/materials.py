@@ -52,7 +52,7 @@ def name(material):
 F0 = np.array([[1.2, 0.3, -0.1], [0.05, 0.9, 0.2], [0.1, -0.15, 1.1]])
 
 
-class Response:
+class PointResponse:
     """Energy and first Piola–Kirchhoff stress of a material at a homogeneous deformation, compiled once."""
 
     # one for all: a mesh holds communicators, and MPI has few
@@ -71,7 +71,7 @@ class Response:
         return evaluate(self._values, self._mesh, np.zeros(1, dtype=np.int32))[0]
 
 
-response = functools.cache(Response)
+response = functools.cache(PointResponse)
 
 
 def energy(material, F):
