@@ -42,6 +42,14 @@ def test_imports_flow_one_way(package):
         assert not strangers, f"{package}.{path.stem} imports {', '.join(sorted(strangers))}"
 
 
+@pytest.mark.parametrize("package", PACKAGES)
+def test_mpi_is_loaded_first(package):
+    """Whichever module is imported first, the library of MPI is there before dolfinx."""
+    uses_dolfinx = any("dolfinx" in path.read_text() for path in (SOURCES / package).glob("*.py"))
+    first = ast.parse((SOURCES / package / "__init__.py").read_text()).body[1:2]
+    assert not uses_dolfinx or [ast.unparse(node) for node in first] == ["import mpi4py.MPI"]
+
+
 def test_no_module_imports_itself_through_others():
     graph = {f"cutsim.{path.parent.name}.{path.stem}": imports(path) for path in SOURCES.glob("*/*.py")}
     TopologicalSorter(graph).prepare()  # raises CycleError

@@ -1,5 +1,7 @@
 """Identification of material parameters from the files of a testing machine (docs/identification.md)."""
 
+import mpi4py.MPI  # noqa: F401  # before dolfinx, whose wheel needs the library that this loads
+
 from cutsim.identify.calibration import MaterialFit, StressTest, fit_material
 from cutsim.identify.fitting import Fit, fit_model
 from cutsim.identify.indentation import fit_shear_modulus, layer_factor, poisson_ratio, punch_force
