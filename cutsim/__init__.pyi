@@ -27,7 +27,7 @@ from .materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from .materials.directions import piecewise_direction
 from .materials.elastic import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
 from .materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from .materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
+from .materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
 from .materials.thermoelastic import ThermoElastic
 from .materials.viscoelastic import Prony
 from .pairs.surface_pair import SurfacePair
@@ -81,6 +81,7 @@ __all__ = [
     "Insertion",
     "InterfaceHeat",
     "IsochoricNeoHookean",
+    "IsochoricOgden",
     "Layer",
     "LayeredBlock",
     "LinearElastic",

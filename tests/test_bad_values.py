@@ -115,6 +115,7 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "NeoHookean": good(young=1.0, poisson=0.3),
     "NeoHookean.from_moduli": good(shear=1.0, bulk=1.0),
     "Newmark": good(beta=0.25, gamma=0.5),
+    "IsochoricOgden": good(moduli=(1.0,), exponents=(2.0,), bulk=1.0),
     "Ogden": good(moduli=(1.0,), exponents=(2.0,), volumetric=1.0),
     "Ogden.from_poisson": good(moduli=(1.0,), exponents=(2.0,), poisson=0.3),
     "PairHeat": good(temperature="@temperature", pair="@pair", law=cutsim.ContactHeat(1.0, 1.0)),

@@ -16,7 +16,7 @@ from cutsim.fields.state import State
 from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.materials.elastic import LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
+from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
 from helpers.blocks import make_blocks
 from helpers.laws import NU, E
 from helpers.materials import (
@@ -102,6 +102,8 @@ def test_moduli_are_those_of_young_and_poisson(kind):
         (Ogden, ((1.0,), (2.0, 1.0), 1.0), "exponents"),
         (Ogden, ((1.0,), (0.0,), 1.0), "exponents"),
         (Ogden, ((1.0,), (2.0,), 0.0), "volumetric"),
+        (IsochoricOgden, ((1.0, -1.0), (2.0, 1.0), 1.0), "moduli"),
+        (IsochoricOgden, ((1.0,), (2.0,), 0.0), "bulk"),
         (Ogden.from_poisson, ((1.0,), (2.0,), 0.5), "poisson"),
         (Reinforced, (MOONEY, ()), "fibres"),
         (ExponentialFibres, ((0.0, 0.0), 1.0, 1.0), "direction"),

@@ -14,7 +14,7 @@ from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.materials.directions import piecewise_direction
 from cutsim.materials.elastic import IsochoricNeoHookean, NeoHookean
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from cutsim.materials.rubbers import ArrudaBoyce, Ogden, Yeoh
+from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, Ogden, Yeoh
 from cutsim.materials.stretches import stretch_power_sums
 from helpers.blocks import make_blocks
 from helpers.fields import rotation, smooth
@@ -46,6 +46,7 @@ INVARIANTS = {
     ),
 }
 OGDEN = Ogden((0.5, 0.3, 0.02), (1.3, -2.0, 9.0), 3.0)
+ISOCHORIC = IsochoricOgden(OGDEN.moduli, OGDEN.exponents, 3.0)
 
 
 @pytest.mark.parametrize("stretch", STRETCHES)
@@ -75,7 +76,8 @@ def test_ogden(path, stretch):
     """P₁ = Σ μ/m (λ₁ᵐ − λ₃ᵐ)/λ₁ at constant volume; two stretches coincide in two of the paths, all three at 1."""
     a, b, c = incompressible(path, stretch)
     exact = sum(mu / m * (a**m - c**m) / a for mu, m in zip(OGDEN.moduli, OGDEN.exponents, strict=True))
-    assert nominal(OGDEN, (a, b, c)) == pytest.approx(exact, rel=1e-10, abs=1e-12)
+    for material in (OGDEN, ISOCHORIC):
+        assert nominal(material, (a, b, c)) == pytest.approx(exact, rel=1e-10, abs=1e-12)
 
 
 @pytest.mark.parametrize("stretches", [(2.0, 0.7, 0.7), (1.3, 1.3, 1.3), (1.3, 1.1, 0.8), (1.1, 1.1, 1.1 + 1e-7)])
@@ -96,6 +98,11 @@ def test_ogden_contains_neo_hookean_and_its_own_notation():
     J, T = np.linalg.det(F0), np.linalg.inv(F0).T
     np.testing.assert_allclose(part, ((J - 1) * J - neo.lame * np.log(J)) * T, atol=1e-13)
     assert Ogden.from_poisson((1.0, 0.4), (2.0, 5.0), 0.47).poisson == pytest.approx(0.47)
+    np.testing.assert_allclose(
+        stress(IsochoricOgden((2 * 0.7,), (2.0,), 1.0), F0),
+        stress(IsochoricNeoHookean.from_moduli(0.7, 1.0), F0),
+        atol=1e-13,
+    )
 
 
 # -- principal stretches ----------------------------------------------------------------------------------------------

@@ -207,9 +207,7 @@ class Ogden(_WithModuli):
     volumetric: float
 
     def __post_init__(self) -> None:
-        require_numbers("moduli", self.moduli, positive)
-        require_numbers("exponents", self.exponents, length=len(self.moduli))
-        require("exponents", self.exponents, 0 not in self.exponents, "as many as moduli, none zero")
+        _require_terms(self.moduli, self.exponents)
         require_number("volumetric", self.volumetric, positive)
 
     @classmethod
@@ -236,3 +234,46 @@ class Ogden(_WithModuli):
             for modulus, m, power_sum in zip(self.moduli, self.exponents, sums, strict=True)
         ]
         return sum(terms), 0.5 * self.volumetric * (J - 1) ** 2
+
+
+@checked
+@dataclass(frozen=True)
+class IsochoricOgden(_NearlyIncompressible):
+    """Nearly incompressible Ogden solid, W = Σ μᵢ/mᵢ² (λ̄₁ᵐ + λ̄₂ᵐ + λ̄₃ᵐ − 3) + K/2 (ln J)², λ̄ᵢ = J^(−1/3) λᵢ.
+
+    In the notation W = Σ μₚ/αₚ (λ̄₁ᵅ + λ̄₂ᵅ + λ̄₃ᵅ − 3) of Ogden, m = α and μ = μₚ αₚ.  Energy and stress at constant
+    volume are those of `Ogden`.
+
+    Args:
+        moduli: μᵢ > 0, one for each term [stress].
+        exponents: mᵢ ≠ 0 [–].
+        bulk: Bulk modulus K > 0 [stress].
+
+    Raises:
+        ValueError: A constant is outside its range, or there are not as many moduli as exponents.
+    """
+
+    moduli: tuple[float, ...]
+    exponents: tuple[float, ...]
+    bulk: float
+
+    def __post_init__(self) -> None:
+        _require_terms(self.moduli, self.exponents)
+        require_number("bulk", self.bulk, positive)
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus G = ½ Σ μᵢ [stress]."""
+        return 0.5 * sum(self.moduli)
+
+    def _distortion(self, F: Expr) -> Expr:
+        J, sums = ufl.det(F), stretch_power_sums(F, self.exponents)
+        terms = zip(self.moduli, self.exponents, sums, strict=True)
+        return sum(modulus / m**2 * (J ** (-m / 3) * power_sum - 3) for modulus, m, power_sum in terms)
+
+
+def _require_terms(moduli: tuple[float, ...], exponents: tuple[float, ...]) -> None:
+    """Refuse what are no terms of an Ogden solid."""
+    require_numbers("moduli", moduli, positive)
+    require_numbers("exponents", exponents, length=len(moduli))
+    require("exponents", exponents, 0 not in exponents, "as many as moduli, none zero")

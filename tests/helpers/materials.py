@@ -18,7 +18,7 @@ from cutsim.fields.state import State
 from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from cutsim.materials.rubbers import ArrudaBoyce, MooneyRivlin, Ogden, Yeoh
+from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
 from helpers.fields import rotation
 from helpers.laws import NU, E
 
@@ -31,6 +31,7 @@ ISOTROPIC = [
     Yeoh(0.3, -0.05, 0.02, 4.0),
     ArrudaBoyce(0.4, 8.0, 4.0),
     Ogden((0.5, 0.3), (1.3, -2.0), 2.0),
+    IsochoricOgden((0.5, 0.3), (1.3, -2.0), 4.0),
 ]
 AXIS = (0.6, 0.8, 0.0)
 ANISOTROPIC = [
