@@ -20,6 +20,10 @@ class HeatLaw(Protocol):
     def capacity(self) -> float:
         """Heat capacity of the interface per area [energy/(area·temperature)]."""
 
+    @property
+    def adiabatic(self) -> bool:
+        """Whether no heat passes between the surfaces, so that the temperature of the other one does not matter."""
+
     def exchange(
         self, pressure: Expr, plus: Expr, minus: Expr, source: Expr, contact: Expr, dt: Expr
     ) -> tuple[Expr, Expr, Expr]:
@@ -94,6 +98,11 @@ class ContactHeat:
         mixed = (g_plus * plus + g_minus * minus + stored * contact + source) / divisor
         return q_plus, q_minus, ufl.conditional(path, mixed, r_plus * plus + r_minus * minus)
 
+    @property
+    def adiabatic(self) -> bool:
+        """False."""
+        return False
+
     def conducts(self, pressure: Values) -> NDArray[np.bool_]:
         """Where there is a way for heat between surface and interface, at a pressure."""
         return (pressure > 0) | (self.gap_conductance > 0)
@@ -120,6 +129,11 @@ class AdiabaticTool:
     def capacity(self) -> float:
         """Zero [energy/(area·temperature)]."""
         return 0.0
+
+    @property
+    def adiabatic(self) -> bool:
+        """True."""
+        return True
 
     def exchange(
         self, pressure: Expr, plus: Expr, minus: Expr, source: Expr, contact: Expr, dt: Expr

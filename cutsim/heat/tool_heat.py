@@ -11,7 +11,7 @@ from cutsim.base.parameters import Schedule, TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns
 from cutsim.fields.temperature import Temperature
-from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
+from cutsim.heat.contact_heat import HeatLaw
 from cutsim.heat.exchange import ExchangeTerm, HeatExchange
 from cutsim.tools.tool_contact import ToolContact
 
@@ -37,14 +37,14 @@ class ToolHeat(ExchangeTerm):
         self,
         temperature: Temperature,
         tool: ToolContact,
-        law: ContactHeat | AdiabaticTool,
+        law: HeatLaw,
         tool_temperature: float | TimeFunction | None = None,
         *,
         name: str | None = None,
     ) -> None:
         super().__init__(temperature, name or tool.name)
-        given, adiabatic = tool_temperature is not None, isinstance(law, AdiabaticTool)
-        require("tool_temperature", tool_temperature, given != adiabatic, "given unless the tool is adiabatic")
+        given = tool_temperature is not None
+        require("tool_temperature", tool_temperature, given != law.adiabatic, "given unless the tool is adiabatic")
         require("law.capacity", law.capacity, law.capacity == 0, "0 for a tool")
         self.tool = tool
         self._tool_temperature = (

@@ -4,7 +4,7 @@ A law sees the slip since the point at which its traction would vanish, the *anc
 anchor follows: what the law does not hold elastically has slipped for good.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import ufl
@@ -27,6 +27,9 @@ class FrictionLaw(Protocol):
     @property
     def compliance(self) -> float:
         """Elastic slip per traction [length/stress]; 0 if nothing is held elastically."""
+
+    def on_penalty(self, stiffness: float) -> "FrictionLaw":
+        """The law on a contact with a normal penalty [stress/length], which may replace a tangential one not given."""
 
     def limit(self, pressure: Expr, temperature: Expr | None) -> Expr:
         """Largest traction without viscosity, μ p [stress]."""
@@ -79,6 +82,10 @@ class Coulomb:
         assert self.stiffness is not None
         return 1 / self.stiffness
 
+    def on_penalty(self, stiffness: float) -> "Coulomb":
+        """The law with its own tangential penalty, or that of the normal contact [stress/length]."""
+        return self if self.stiffness is not None else replace(self, stiffness=stiffness)
+
     def limit(self, pressure: Expr, temperature: Expr | None) -> Expr:
         """Largest traction without viscosity, μ(T) p [stress]."""
         if self.T_ref is None or self.T_damage is None:
@@ -122,6 +129,10 @@ class SmoothCoulomb:
     def compliance(self) -> float:
         """Zero: nothing is held elastically."""
         return 0.0
+
+    def on_penalty(self, stiffness: float) -> "SmoothCoulomb":
+        """The law itself, which has no tangential penalty."""
+        return self
 
     def limit(self, pressure: Expr, temperature: Expr | None) -> Expr:
         """Largest traction μ p [stress]."""

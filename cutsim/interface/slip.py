@@ -1,7 +1,7 @@
 """Slip history at integration points: anchor, traction and dissipation of friction (docs/theory.md §3.3)."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import ufl
@@ -29,17 +29,14 @@ def check_friction(name: str, friction: FrictionLaw | float | None) -> None:
 
 
 def completed(friction: FrictionLaw | float, stiffness: float) -> FrictionLaw:
-    """The law with a tangential penalty: its own, or that of the normal contact.
+    """The law as it acts on a contact, with a tangential penalty where it needs one.
 
     Args:
         friction: A law, or the coefficient of Coulomb's.
         stiffness: Penalty of the normal contact [stress/length].
     """
-    if not isinstance(friction, FrictionLaw):
-        return Coulomb(float(friction), stiffness)
-    if isinstance(friction, Coulomb) and friction.stiffness is None:
-        return replace(friction, stiffness=stiffness)
-    return friction
+    law = friction if isinstance(friction, FrictionLaw) else Coulomb(float(friction))
+    return law.on_penalty(stiffness)
 
 
 def _closed(before: Expr, now: Expr) -> Expr:

@@ -15,6 +15,7 @@ from cutsim.fields.points import Surface
 from cutsim.fields.state import State
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.slip import check_friction
 from cutsim.results.recording import Columns
 from cutsim.studies.body import CrackedBody
 from cutsim.studies.cut_area import CutArea
@@ -72,7 +73,7 @@ class Insertion:
         drive: Drive,
         *,
         notch: float = 0.0,
-        friction: float | FrictionLaw = 0.0,
+        friction: FrictionLaw | float | None = None,
         fixture: Fixture = STANDING,
         mechanics: Mapping[str, Any] | None = None,
     ) -> Self:
@@ -83,15 +84,14 @@ class Insertion:
             tool: The whole tool (side 0); a blade, or in a body of revolution and in space a needle.
             drive: Its motion.
             notch: Depth of the notch in which the tool is inserted, 0 for a body without one [length].
-            friction: Friction coefficient of tool and body [–], or a law.
+            friction: Friction law of tool and body, or the coefficient of Coulomb's; None for none.
             fixture: Names of groups of the mesh, and how the body is held.
             mechanics: Further arguments of `Mechanics`, such as ``{"analysis": "dynamic"}``.
 
         Raises:
             ValueError: A parameter is outside its range, the tool does not fit body or notch, or a group is missing.
         """
-        if not isinstance(friction, FrictionLaw):
-            require_number("friction", friction, nonnegative)
+        check_friction("friction", friction)
         fixture.check(body)
         _check_tool(tool, body)
         frame = Frame.of(body, tool, fixture.plate, fixture.symmetry if fixture.halved(body) else None)
@@ -184,7 +184,7 @@ def _contacts(
     frame: Frame,
     motion: Motion,
     top: tuple[str, str],
-    friction: float | FrictionLaw,
+    friction: FrictionLaw | float | None,
 ) -> tuple[ToolContact, ...]:
     """The tool on each face of each part of the crack."""
     plus = frame.side(body.cracks[0])

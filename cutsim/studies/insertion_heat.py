@@ -10,7 +10,7 @@ from cutsim.bodies.solid import Solid
 from cutsim.fields.space import cracked_space
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.conduction import HeatBody
-from cutsim.heat.contact_heat import AdiabaticTool, ContactHeat
+from cutsim.heat.contact_heat import ContactHeat, HeatLaw
 from cutsim.heat.interface_heat import InterfaceHeat
 from cutsim.heat.tool_heat import ToolHeat
 from cutsim.heat.transfer import HeatTransfer
@@ -45,7 +45,7 @@ class ThermalCut:
     """
 
     solids: Conductor | Mapping[str, Conductor]
-    tool: ContactHeat | AdiabaticTool
+    tool: HeatLaw
     fracture_fraction: float = 1.0
 
     def of(self, solid: Solid) -> Conductor:
@@ -85,6 +85,6 @@ def heated(cut: Insertion, thermal: ThermalCut, initial: float) -> ThermoMechani
     # the faces lie apart wherever the bond has broken: what they exchange before hardly matters
     faces = ContactHeat(1.0, 1.0, fracture_fraction=thermal.fracture_fraction)
     cracks = [InterfaceHeat(temperature, crack, faces) for crack in body.cracks]
-    given = None if isinstance(thermal.tool, AdiabaticTool) else initial
+    given = None if thermal.tool.adiabatic else initial
     tools = [ToolHeat(temperature, contact, thermal.tool, given) for contact in cut.contacts]
     return ThermoMechanics(cut.mechanics, HeatTransfer(temperature, [*conductors, *cracks, *tools]))
