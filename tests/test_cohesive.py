@@ -8,9 +8,9 @@ import pytest
 
 from cutsim.interface.cohesive import Bilinear, Exponential, process_zone_element
 from cutsim.interface.dissipation import Way, losses
-from helpers.laws import BILINEAR, EXPONENTIAL, PPR, PROPORTIONAL
+from helpers.laws import BILINEAR, EXPONENTIAL, PPR, PROPORTIONAL, TRAPEZOIDAL
 
-LAWS = [EXPONENTIAL, BILINEAR, PROPORTIONAL, PPR]
+LAWS = [EXPONENTIAL, BILINEAR, PROPORTIONAL, PPR, TRAPEZOIDAL]
 
 PAIRS = [
     {"strength": 2.0, "opening": 0.1},
@@ -183,6 +183,21 @@ def test_a_jump_of_any_size_spends_the_toughness(law, mode, size):
     end = size * law.opening * np.eye(2)[mode]
     toughness = (law.toughness, law.shear_toughness)[mode]
     assert spent(law, np.array([[0.0, 0.0], end]))[0] == pytest.approx(toughness, rel=1e-9)
+
+
+def test_no_kink_is_missed_wherever_it_lies_in_a_step():
+    """The loss in one step is work less what is stored, T = t up to δ_2: a kink near an end of a part must be seen."""
+    law = TRAPEZOIDAL
+    jump = law.opening * 10 ** np.random.default_rng(0).uniform(0, 3, 20_000)
+    end, held = np.zeros((len(jump), 2)), np.clip(jump, law.rise, law.plateau) - law.rise
+    end[:, 0] = jump
+    left = (law.final - np.clip(jump, law.plateau, law.final)) / (law.final - law.plateau)
+    fallen = 0.5 * (law.final - law.plateau) * (1 - left**2)
+    work = law.strength * (0.5 * law.rise + held + fallen)
+    stored = 0.5 * law.secants(jump, 0 * jump)[0] * jump**2
+    memory = np.full((len(jump), 2), law.strength / law.rise)
+    lost = losses(law, Way(0 * end, end), memory)
+    np.testing.assert_allclose(lost, work - stored, atol=1e-7 * law.toughness)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from cutsim.base.arrays import Array
 from cutsim.interface.cohesive import CohesiveLaw
 
-_PLACES, _WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(5)[i] + (1.0, 0.0)[i]) for i in (0, 1))
+# Lobatto's rule with six points on [0, 1]: as exact as that of Gauss with five, but it sees the ends of an interval, so
+# that a kink of the law near one of them does not pass unseen by an interval and its halves alike
+_P5 = np.polynomial.Legendre.basis(5)
+_PLACES = 0.5 + 0.5 * np.concatenate([[-1.0], _P5.deriv().roots().real, [1.0]])
+_WEIGHTS = 1 / (30 * _P5(2 * _PLACES - 1) ** 2)
 # loss that is not resolved, as a fraction of the toughness
 _TOLERANCE = 1e-11
 # secant over its memory at which a bond is broken
@@ -112,17 +116,17 @@ def _last(holds: Callable[[Array], NDArray[np.bool_]], points: int) -> Array:
 
 
 def _integral(power: Callable[[NDArray[np.intp], Array], Array], start: Array, end: Array, tolerance: float) -> Array:
-    """Integrals along the ways, each halved until Gauss's rule with five points is as good as with ten."""
+    """Integrals along the ways, each halved until Lobatto's rule with six points is as good as twice on its halves."""
 
-    def gauss(points: NDArray[np.intp], a: Array, b: Array) -> Array:
+    def lobatto(points: NDArray[np.intp], a: Array, b: Array) -> Array:
         return np.asarray((power(points, a[:, None] + (b - a)[:, None] * _PLACES) @ _WEIGHTS) * (b - a))
 
     total = np.zeros(len(start))
     points, a, b = np.arange(len(start)), start, end
-    whole = gauss(points, a, b)
+    whole = lobatto(points, a, b)
     for _ in range(_HALVINGS):
         middle = 0.5 * (a + b)
-        first, second = gauss(points, a, middle), gauss(points, middle, b)
+        first, second = lobatto(points, a, middle), lobatto(points, middle, b)
         good = np.abs(first + second - whole) <= tolerance
         np.add.at(total, points[good], (first + second)[good])
         if good.all():

@@ -1,5 +1,8 @@
 """Materials and cohesive laws that many tests share."""
 
+from dataclasses import dataclass
+
+from cutsim.base.functions import if_less, larger, positive_part, sqrt
 from cutsim.interface.cohesive import Bilinear, Exponential
 from cutsim.interface.ppr import ParkPaulinoRoesler
 from cutsim.materials.elastic import LinearElastic
@@ -15,3 +18,42 @@ PROPORTIONAL = Bilinear.proportional(
 PPR = ParkPaulinoRoesler(
     strength=2.0, toughness=0.2, shear_strength=3.0, shear_toughness=0.5, alpha=3.0, beta=2.2, peak=0.15, shear_peak=0.2
 )
+
+
+@dataclass(frozen=True)
+class Trapezoidal:
+    """Trapezoidal law (Tvergaard and Hutchinson 1992), the same in opening and sliding, with three kinks.
+
+    The traction rises to the strength at δ_1, stays there up to δ_2 and falls to zero at δ_c.
+    """
+
+    strength: float = 2.0
+    rise: float = 0.1
+    plateau: float = 0.25
+    final: float = 0.4
+
+    @property
+    def opening(self):
+        return self.rise
+
+    @property
+    def toughness(self):
+        return 0.5 * self.strength * (self.final + self.plateau - self.rise)
+
+    @property
+    def shear_toughness(self):
+        return self.toughness
+
+    def secants(self, opening, sliding):
+        jump = sqrt(opening**2 + sliding**2 + (1e-8 * self.rise) ** 2)
+        held = self.strength / larger(jump, self.rise)
+        falling = self.strength * positive_part(self.final - jump) / ((self.final - self.plateau) * jump)
+        k = if_less(jump, self.plateau, held, falling)
+        return k, k
+
+    def damage(self, k_n, k_t):
+        whole = self.strength / self.rise
+        return 1 - k_n / whole, 1 - k_t / whole
+
+
+TRAPEZOIDAL = Trapezoidal()
