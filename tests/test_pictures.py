@@ -13,9 +13,11 @@ from mpi4py import MPI
 
 from cutsim.base.compat import cell_partitioner
 from cutsim.fields.space import cracked_space
-from cutsim.results import pictures, plots
-from cutsim.results.pictures import draw_body, gather_facets, gather_grid, revolved
+from cutsim.results import grids, pictures, plots
+from cutsim.results.grids import gather_facets, gather_grid
+from cutsim.results.pictures import draw_body
 from cutsim.results.plots import COLOURS, Curve, plot_curves, plot_energy, plot_parts
+from cutsim.results.tool_surfaces import revolved
 
 SHAPES = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
 
@@ -137,7 +139,7 @@ def test_a_failing_picture_is_a_warning(folder, caplog, monkeypatch):
     with pytest.raises(ValueError, match="mirror = 'w'"):
         draw_body(folder / "no.png", grid, "height", label="height", mirror=("w",))
     monkeypatch.setitem(sys.modules, "pyvista", None)  # as if it were not installed
-    with caplog.at_level(logging.WARNING, logger=pictures.__name__):
+    with caplog.at_level(logging.WARNING, logger=grids.__name__):
         assert gather_grid(u, {"height": height}) is None
     assert ("no pictures" in caplog.text) == (MPI.COMM_WORLD.rank == 0)
 

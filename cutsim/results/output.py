@@ -34,7 +34,7 @@ _RESERVE = 4_000_000
 os.environ.setdefault("HOME", str(Path.home()))
 
 
-class _Closing:
+class Closing:
     """Base of context managers that close themselves at the end."""
 
     def close(self) -> None:
@@ -49,7 +49,7 @@ class _Closing:
         self.close()
 
 
-class HistoryWriter(_Closing):
+class HistoryWriter(Closing):
     """Writer of a CSV table with one row for each accepted step.
 
     Every row is flushed as it is written, so the file is complete and readable at any moment, also after a
@@ -145,14 +145,24 @@ def write_summary(path: Path | str, values: Mapping[str, Any], comm: MPI.Comm) -
     """
 
     def write() -> None:
-        target = Path(path)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        draft = target.with_name(target.name + ".part")
         text = json.dumps(_plain(values), indent=2, ensure_ascii=False, allow_nan=False)
-        draft.write_text(text + "\n", encoding="utf-8")
-        os.replace(draft, target)
+        replace_file(path, (text + "\n").encode())
 
     on_root(comm, write)
+
+
+def replace_file(path: Path | str, data: bytes) -> None:
+    """Write a file in one go: a reader sees the old or the new one, never half of it. Call it on one rank.
+
+    Args:
+        path: The file; folders are made.
+        data: What it will hold.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    draft = target.with_name(target.name + ".part")
+    draft.write_bytes(data)
+    os.replace(draft, target)
 
 
 def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False, subfolders: bool = True) -> None:
@@ -182,7 +192,7 @@ def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False,
     on_root(comm, claim)
 
 
-class FieldWriter(_Closing):
+class FieldWriter(Closing):
     """Writer of fields in VTX files (ADIOS2), which ParaView opens with its ADIOS2VTXReader. Collective.
 
     - ``displacement.bp`` holds u as it is solved for. Its points are the nodes of the space, so a crack opens

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cutsim.results.pictures import draw_stress, prism, revolved
+from cutsim.results.pictures import draw_stress
+from cutsim.results.tool_surfaces import prism, revolved
 from cutsim.studies.insertion import Insertion
 
 if TYPE_CHECKING:

@@ -119,7 +119,8 @@ class TriangulatedTool(RigidTool):
         points = slave_points(state, facets, state.measures.exterior(facets))
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, self._position)
-        self.contact, self._normal_size = contact, points.mean(normal_size(state.mesh, points.facets))
+        self.contact, self.surface = contact, surface
+        self._normal_size = points.mean(normal_size(state.mesh, points.facets))
         slave = OuterSurface(state.V, points.facets)
         kinematics = PairKinematics(
             state.memory, name, slave, master, small_sliding=False, search=search or size, size=size

@@ -49,8 +49,9 @@ from cutsim import (
     read_geo,
     run,
 )
+from cutsim.results.grids import gather_grid
 from cutsim.results.output import claim_folder, interpolate
-from cutsim.results.pictures import draw_body, gather_grid
+from cutsim.results.pictures import draw_body
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
 from cutsim.studies.insertion_heat import Conductor, ThermalCut, heated

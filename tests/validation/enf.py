@@ -62,8 +62,9 @@ from cutsim import (
     run,
 )
 from cutsim.base.compat import nodal_expression
+from cutsim.results.grids import gather_facets, gather_grid
 from cutsim.results.output import claim_folder, write_summary
-from cutsim.results.pictures import draw_body, gather_facets, gather_grid
+from cutsim.results.pictures import draw_body
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Columns, Recording
 from cutsim.studies.fracture import (

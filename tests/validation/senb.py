@@ -56,8 +56,9 @@ from cutsim.fields.state import State
 from cutsim.interface.cohesive import Exponential, separation_curve
 from cutsim.interface.crack import Crack
 from cutsim.materials.elastic import LinearElastic
+from cutsim.results.grids import gather_facets, gather_grid
 from cutsim.results.output import claim_folder
-from cutsim.results.pictures import draw_body, gather_facets, gather_grid
+from cutsim.results.pictures import draw_body
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Columns, Recording
 from cutsim.studies.fracture import BentBeam, JIntegral, energy_release_from_energy, plane_modulus, stress_intensity

@@ -39,8 +39,9 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from cutsim import Blade, Drive, Exponential, Fixture, Insertion, LayeredBlock, StepControl, laminate, run
+from cutsim.results.grids import VonMises, gather_grid
 from cutsim.results.output import claim_folder
-from cutsim.results.pictures import draw_body, gather_grid, von_mises
+from cutsim.results.pictures import draw_body
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording
 from cutsim.studies.layered import Layer, skin
@@ -184,7 +185,7 @@ def draw(cut: Insertion, history: History, out: Path) -> None:
         plot_layers(cut.body, history, out / "layer_energies.png")
         plot_energy(out / "energy.png", history, x="time", xlabel="way of the blade [mm]")
     block, space = cut.body, fem.functionspace(cut.body.state.mesh, ("DG", 0))
-    number, stress = fem.Function(space), von_mises(block.solids)
+    number, stress = fem.Function(space), VonMises(block.solids)()
     stress.x.array[:] *= 1e3
     for i, solid in enumerate(block.solids, start=1):
         number.x.array[space.dofmap.list[solid.cells, 0]] = i

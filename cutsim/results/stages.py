@@ -1,0 +1,178 @@
+"""Stages of a run: light snapshots of the deformed body, from which pictures, animation and views are drawn later."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutsim.base.units import Units
+from cutsim.results.output import replace_file
+
+if TYPE_CHECKING:
+    import pyvista
+
+Floats = NDArray[np.float32]
+
+#: Folder of the stages in that of a run.
+FOLDER = "stages"
+
+# what a stage consists of
+_SKINS = ("body", "cracks", "tools")
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Part of a stage: a surface in space, or what fills a plane, or lines.
+
+    Attributes:
+        points: Its nodes before deformation, shape (nodes, 3) [length].
+        displacement: Their displacements, of the same shape [length].
+        cells: Nodes of each triangle or line, shape (cells, 3 or 2).
+        values: Name → one value per node or per cell.
+    """
+
+    points: Floats
+    displacement: Floats
+    cells: NDArray[np.int32]
+    values: Mapping[str, Floats] = field(default_factory=dict)
+
+    @property
+    def deformed(self) -> Floats:
+        """Present positions of the nodes [length]."""
+        return self.points + self.displacement
+
+    @classmethod
+    def of(cls, mesh: pyvista.PolyData, at_nodes: Iterable[str] = (), in_cells: Iterable[str] = ()) -> Self:
+        """Triangles, or lines, of a mesh, with its displacement ``u`` and the values that are named."""
+        mesh = mesh if mesh.n_lines else mesh.triangulate()
+        cells = mesh.lines.reshape(-1, 3)[:, 1:] if mesh.n_lines else mesh.regular_faces
+        u = mesh.point_data.get("u", np.zeros_like(mesh.points))
+        values = {name: _floats(mesh.point_data[name]) for name in at_nodes}
+        values |= {name: _floats(mesh.cell_data[name]) for name in in_cells}
+        return cls(_floats(mesh.points), _floats(u), np.asarray(cells, np.int32), values)
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Parts as one; without any, one that is empty."""
+        if not parts:
+            none = np.zeros((0, 3), np.float32)
+            return cls(none, none, np.zeros((0, 3), np.int32))
+        starts = np.cumsum([0, *(len(part.points) for part in parts[:-1])])
+        return cls(
+            np.concatenate([part.points for part in parts]),
+            np.concatenate([part.displacement for part in parts]),
+            np.concatenate([part.cells + start for part, start in zip(parts, starts, strict=True)]).astype(np.int32),
+            {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values},
+        )
+
+    def mirrored(self, plane: str) -> Self:
+        """The part with its image in a plane through the origin, given by the axis normal to it."""
+        sign = np.where(np.arange(3) == "xyz".index(plane), -1, 1).astype(np.float32)
+        image = replace(
+            self, points=sign * self.points, displacement=sign * self.displacement, cells=self.cells[:, ::-1]
+        )
+        return self.joined([self, image])
+
+
+@dataclass(frozen=True)
+class Stage:
+    """State of a run at one time, as it is drawn.
+
+    Attributes:
+        time: The time [time].
+        body: The outer surface with the faces of cracks, or in a plane all of the body. At its nodes it has "stress",
+            that of von Mises; its cells have the number of their "part".
+        cracks: Both faces of the cracks that have a law, with the "damage" of their cells.
+        tools: Rigid tools.
+        parts: Names of the parts of the body.
+        units: Units of all numbers.
+        flat: Whether the problem is a plane one.
+        mirror: Planes of symmetry through the origin in which everything has its image, by the axes normal to them.
+    """
+
+    time: float
+    body: Skin
+    cracks: Skin
+    tools: Skin
+    parts: tuple[str, ...]
+    units: Units
+    flat: bool
+    mirror: tuple[str, ...] = ()
+
+    def whole(self) -> Self:
+        """The stage with its images in the planes of symmetry."""
+        stage = replace(self, mirror=())
+        for plane in self.mirror:
+            skins = {name: getattr(stage, name).mirrored(plane) for name in _SKINS}
+            stage = replace(stage, **skins)
+        return stage
+
+    def write(self, path: Path) -> None:
+        """Write the stage as arrays of numpy, in one go."""
+        about = {"time": self.time, "parts": self.parts, "units": asdict(self.units), "flat": self.flat}
+        arrays: dict[str, Any] = {"about": json.dumps(about | {"mirror": self.mirror})}
+        for name in _SKINS:
+            skin: Skin = getattr(self, name)
+            arrays |= {f"{name}.points": skin.points, f"{name}.displacement": skin.displacement}
+            arrays |= {f"{name}.cells": skin.cells}
+            arrays |= {f"{name}.values.{key}": values for key, values in skin.values.items()}
+        data = BytesIO()
+        np.savez_compressed(data, **arrays)
+        replace_file(path, data.getvalue())
+
+    @classmethod
+    def read(cls, path: Path | str) -> Self:
+        """Read a stage.
+
+        Raises:
+            ValueError: The file is not that of a stage.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                arrays = dict(file)
+            about = json.loads(str(arrays.pop("about")))
+            return cls(
+                about["time"],
+                _skin(arrays, "body"),
+                _skin(arrays, "cracks"),
+                _skin(arrays, "tools"),
+                parts=tuple(about["parts"]),
+                units=Units(**about["units"]),
+                flat=about["flat"],
+                mirror=tuple(about["mirror"]),
+            )
+        except Exception as error:  # whatever numpy finds wrong with a file
+            raise ValueError(f"{path} is not a stage of a run: {error}") from error
+
+
+def _skin(arrays: Mapping[str, NDArray[Any]], name: str) -> Skin:
+    start = f"{name}.values."
+    values = {key.removeprefix(start): array for key, array in arrays.items() if key.startswith(start)}
+    return Skin(arrays[f"{name}.points"], arrays[f"{name}.displacement"], arrays[f"{name}.cells"], values)
+
+
+def _floats(values: Any) -> Floats:
+    return np.asarray(values, np.float32)
+
+
+def read_stages(folder: Path | str) -> list[Stage]:
+    """Stages of a run in the order of their times; files that cannot be read are left out.
+
+    Args:
+        folder: Folder of the run.
+    """
+    found = {}
+    for path in sorted((Path(folder) / FOLDER).glob("*.npz")):
+        try:
+            stage = Stage.read(path)
+        except ValueError:
+            continue
+        found[stage.time] = stage
+    return [found[time] for time in sorted(found)]

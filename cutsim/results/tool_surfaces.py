@@ -1,0 +1,211 @@
+"""Surfaces of rigid tools, for pictures (pyvista)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem, plot
+from dolfinx.mesh import CellType, create_unit_cube, create_unit_square
+from mpi4py import MPI
+from numpy.typing import ArrayLike, NDArray
+
+from cutsim.base.arrays import Array
+from cutsim.base.compat import nodal_expression
+from cutsim.results.grids import library
+from cutsim.tools.pointed import Pointed
+from cutsim.tools.shapes import Shape
+from cutsim.tools.tool_contact import ToolContact
+from cutsim.tools.triangulated_tool import TriangulatedTool
+
+if TYPE_CHECKING:
+    import pyvista
+
+#: How far a tool is seen beyond the body, as a part of the largest extent of the body.
+BEYOND = 0.15
+# cells along an edge of the grid on which a signed distance is sampled, by dimension
+_SAMPLES = {2: 240, 3: 56}
+
+# from the lowest and the highest corner of a box, shape (2, 3), to the surface in it
+_Surface = Callable[[Array], Any]
+
+
+def prism(
+    outline: NDArray[np.float64],
+    origin: ArrayLike,
+    axes: tuple[ArrayLike, ArrayLike],
+    edge: ArrayLike | None = None,
+) -> pyvista.PolyData | None:
+    """A tool of constant cross-section, for `cutsim.results.pictures.draw_body`.
+
+    Args:
+        outline: Cross-section, rows of two coordinates along the axes.
+        origin: Where the outline has its origin; two or three coordinates.
+        axes: Directions of the two coordinates.
+        edge: From one end of the tool to the other; None for a flat picture.
+
+    Returns:
+        The surface, None where pyvista is missing.
+    """
+    pyvista = library("no tool is drawn")
+    if pyvista is None:
+        return None
+    first, second, start = map(_padded, (*axes, origin))
+    points = start + outline[:, :1] * first + outline[:, 1:] * second
+    face = pyvista.PolyData(points, faces=[len(points), *range(len(points))])
+    return face if edge is None else face.extrude(np.asarray(edge, dtype=float), capping=True)
+
+
+def revolved(
+    outline: NDArray[np.float64],
+    origin: ArrayLike,
+    axes: tuple[ArrayLike, ArrayLike],
+    points: int = 48,
+    turn: tuple[float, float] = (0.0, 2 * np.pi),
+) -> pyvista.PolyData | None:
+    """A tool of revolution in space, for `cutsim.results.pictures.draw_body`.
+
+    Args:
+        outline: Its section through the axis, rows of two coordinates; the second is along the axis of revolution.
+        origin: Where the outline has its origin; three coordinates.
+        axes: Directions of the two coordinates, orthogonal unit vectors.
+        points: Points on a circle.
+        turn: Angles about the axis between which the tool lies, from the first of the directions on [rad].
+
+    Returns:
+        The surface, None where pyvista is missing.
+    """
+    pyvista = library("no tool is drawn")
+    if pyvista is None:
+        return None
+    across, along = outline[outline[:, 0] >= 0].T
+    first, axis = (np.asarray(v, dtype=float) for v in axes)
+    angles = np.linspace(*turn, points)[:, None]
+    directions = np.cos(angles) * first + np.sin(angles) * np.cross(axis, first)
+    x = np.asarray(origin) + across[:, None, None] * directions + along[:, None, None] * axis
+    return pyvista.StructuredGrid(*np.moveaxis(x, -1, 0)[..., None]).extract_surface(algorithm="dataset_surface")
+
+
+class ToolSurfaces:
+    """Surfaces of the rigid tools of a problem where they are at the time, as far as they are near the body.
+
+    Blades and needles are drawn from their outline, triangulations as they are, and every other shape from its signed
+    distance.
+
+    Args:
+        terms: Terms of the problem; those that are no tools are left out.
+    """
+
+    def __init__(self, terms: Iterable[Any]) -> None:
+        known: dict[Any, _Surface] = {}
+        for tool in terms:
+            if isinstance(tool, TriangulatedTool):
+                known[tool] = _Triangulated(tool)
+            elif isinstance(tool, ToolContact):  # what meets several parts of a crack is one tool
+                known.setdefault((tool.shape, *tool.position.value), _shaped(tool, tool.shape))
+        self._surfaces = list(known.values())
+
+    def __call__(self, bounds: Sequence[float]) -> pyvista.PolyData | None:
+        """The tools in triangles; None if there are none.
+
+        Args:
+            bounds: Box around the deformed body, (xmin, xmax, ymin, ymax, zmin, zmax) [length].
+        """
+        box = np.reshape(bounds, (3, 2)).T
+        box = box + BEYOND * np.ptp(box, axis=0).max() * np.array([[-1.0], [1.0]])
+        parts = [part.triangulate() for surface in self._surfaces if (part := surface(box)).n_cells]
+        return parts[0].append_polydata(*parts[1:]) if parts else None
+
+
+def _shaped(tool: ToolContact, shape: Shape) -> _Surface:
+    return _Pointed(tool, shape) if isinstance(shape, Pointed) else _Level(tool, shape)
+
+
+class _Pointed:
+    """A blade or needle, or half of it, from its tip to the end of a box."""
+
+    def __init__(self, tool: ToolContact, shape: Pointed) -> None:
+        self._position, self._shape = tool.position, shape
+        self._push = _padded(shape.push)
+        across = np.eye(3)[2 if len(shape.push) == 2 else int(np.abs(self._push).argmin())]
+        lateral = np.cross(across, self._push) if shape.lateral is None else _padded(shape.lateral)
+        self._lateral = lateral / np.linalg.norm(lateral)
+
+    def __call__(self, box: Array) -> Any:
+        shape, push, tip = self._shape, self._push, _padded(self._position.value)
+        arms = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - tip
+        outline = shape.outline(max(float(np.max(-arms @ push)), shape.tip_radius))
+        flat, half = len(shape.push) == 2, shape.side != 0
+        if shape.round and not flat:
+            turn = (-np.pi / 2, np.pi / 2) if half else (0.0, 2 * np.pi)
+            return revolved(outline, tip, ((shape.side or 1) * self._lateral, -push), turn=turn)
+        if half:
+            outline = outline[shape.side * outline[:, 0] >= 0]
+        edge = np.cross(push, self._lateral)
+        low, high = float(np.min(arms @ edge)), float(np.max(arms @ edge))
+        axes = (self._lateral, -push)
+        return prism(outline, tip, axes) if flat else prism(outline, tip + low * edge, axes, (high - low) * edge)
+
+
+class _Level:
+    """A tool of any shape within a box, from the signed distance at the nodes of a regular grid."""
+
+    def __init__(self, tool: ToolContact, shape: Shape) -> None:
+        self._position, gdim = tool.position, len(tool.position.value)
+        n, comm = _SAMPLES[gdim], MPI.COMM_SELF
+        domain = (
+            create_unit_square(comm, n, n, CellType.quadrilateral)
+            if gdim == 2
+            else create_unit_cube(comm, n, n, n, CellType.hexahedron)
+        )
+        self._corner, self._size = (fem.Constant(domain, np.zeros(gdim, default_scalar_type)) for _ in range(2))
+        x = ufl.SpatialCoordinate(domain)
+        place = ufl.as_vector([self._corner[i] + self._size[i] * x[i] for i in range(gdim)])
+        self._distance = fem.Function(fem.functionspace(domain, ("Lagrange", 1)))
+        self._expression = nodal_expression(shape.distance(place), self._distance.function_space)
+
+    def __call__(self, box: Array) -> Any:
+        pyvista, gdim = library("no tool is drawn"), len(self._position.value)
+        size = np.ptp(box, axis=0)
+        self._corner.value[:], self._size.value[:] = box[0, :gdim] - self._position.value, size[:gdim]
+        self._distance.interpolate(self._expression)
+        cells, kinds, points = plot.vtk_mesh(self._distance.function_space)
+        flat = np.arange(3) >= gdim
+        grid = pyvista.UnstructuredGrid(cells, kinds, np.where(flat, 0.0, box[0]) + points * np.where(flat, 0.0, size))
+        grid["distance"] = self._distance.x.array
+        return grid.clip_scalar("distance", value=0.0).extract_surface(algorithm="dataset_surface")
+
+
+class _Triangulated:
+    """A tool of triangles, or in the plane of segments, which are filled."""
+
+    def __init__(self, tool: TriangulatedTool) -> None:
+        self._position, surface = tool.position, tool.surface
+        pyvista = library("no tool is drawn")
+        facets = np.insert(surface.facets, 0, surface.facets.shape[1], axis=1).ravel()
+        points = np.pad(surface.points, ((0, 0), (0, 3 - surface.points.shape[1])))
+        if surface.points.shape[1] == 3:
+            self._mesh = pyvista.PolyData(points, faces=facets)
+        else:
+            loops = pyvista.PolyData(points, lines=facets).strip()
+            self._mesh = pyvista.PolyData(loops.points, faces=_closed(loops.lines))
+
+    def __call__(self, box: Array) -> Any:
+        return self._mesh.translate(_padded(self._position.value))
+
+
+def _closed(lines: NDArray[np.int64]) -> list[int]:
+    """Polygons, without repeated point, from closed lines in VTK's form."""
+    faces, start = list[int](), 0
+    while start < len(lines):
+        count = int(lines[start])
+        faces += [count - 1, *map(int, lines[start + 1 : start + count])]
+        start += count + 1
+    return faces
+
+
+def _padded(vector: ArrayLike) -> Array:
+    values = np.asarray(vector, dtype=float)
+    return np.pad(values, (0, 3 - len(values)))
