@@ -17,8 +17,8 @@ import cutsim.materials
 SOURCES = Path(cutsim.__file__).parent
 # a package imports from those before it
 PACKAGES = (
-    "base", "fields", "solvers", "materials", "bodies", "interface", "pairs", "tools", "heat", "analysis", "results",
-    "studies", "identify",
+    "base", "readers", "fields", "solvers", "materials", "bodies", "interface", "pairs", "tools", "heat", "analysis",
+    "results", "studies", "identify",
 )  # fmt: skip
 
 
