@@ -1,144 +1,89 @@
-from .analysis.mechanics import Mechanics
-from .analysis.staggered import ThermoMechanics
-from .analysis.stepping import StepControl, StepError, StepReport, run
-from .bodies.loads import Pressure, Support, Traction
-from .bodies.schemes import GeneralisedAlpha, Newmark
-from .bodies.solid import Solid
-from .fields.laminate import laminate
-from .fields.meshing import TaggedMesh, geometry, read_geo, read_msh, tag_mesh
-from .fields.points import Surface
-from .fields.space import cracked_space
-from .fields.state import State
-from .fields.temperature import Temperature
-from .heat.boundary import Convection, HeatFlux, PrescribedTemperature
-from .heat.conduction import HeatBody
-from .heat.contact_heat import AdiabaticTool, ContactHeat
-from .heat.interface_heat import InterfaceHeat
-from .heat.pair_heat import PairHeat
-from .heat.tool_heat import ToolHeat
-from .heat.transfer import HeatTransfer
-from .interface.cohesive import Bilinear, CohesiveLaw, Exponential
-from .interface.contact import PenaltyContact
-from .interface.crack import Crack
-from .interface.crack_friction import CrackFriction
-from .interface.friction import Coulomb, FrictionLaw, SmoothCoulomb
-from .interface.ppr import ParkPaulinoRoesler
-from .materials.anisotropic import FungOrthotropic, TransverselyIsotropic
-from .materials.directions import piecewise_direction
-from .materials.elastic import IsochoricNeoHookean, LinearElastic, Material, NeoHookean, StVenantKirchhoff
-from .materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from .materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
-from .materials.thermoelastic import ThermoElastic
-from .materials.viscoelastic import Prony
-from .pairs.surface_pair import SurfacePair
-from .results.output import read_history
-from .results.pictures import draw_body, draw_stress
-from .results.plots import Curve, plot_curves, plot_energy, plot_parts
-from .results.recording import Recording
-from .solvers.convergence import Tolerances
-from .studies.body import CrackedBody, cracked_block
-from .studies.drive import Drive
-from .studies.fixture import Fixture
-from .studies.insertion import Insertion
-from .studies.layered import Layer, LayeredBlock
-from .studies.picture import draw_insertion
-from .tools.pointed import Blade, Needle
-from .tools.shapes import Ball, FlatPunch, Plane, ToolPath
-from .tools.tool_contact import ToolContact
-from .tools.tool_parts import ToolParts
-from .tools.triangulated_tool import TriangulatedTool
-from .tools.triangulation import Triangulation
-
-__version__: str
-
-__all__ = [
-    "AdiabaticTool",
-    "ArrudaBoyce",
-    "Ball",
-    "Bilinear",
-    "Blade",
-    "CohesiveLaw",
-    "ContactHeat",
-    "Convection",
-    "Coulomb",
-    "Crack",
-    "CrackFriction",
-    "CrackedBody",
-    "Curve",
-    "DispersedFibres",
-    "Drive",
-    "EllipsoidalFibres",
-    "Exponential",
-    "ExponentialFibres",
-    "Fixture",
-    "FlatPunch",
-    "FrictionLaw",
-    "FungOrthotropic",
-    "GeneralisedAlpha",
-    "HeatBody",
-    "HeatFlux",
-    "HeatTransfer",
-    "Insertion",
-    "InterfaceHeat",
-    "IsochoricNeoHookean",
-    "IsochoricOgden",
-    "Layer",
-    "LayeredBlock",
-    "LinearElastic",
-    "Material",
-    "Mechanics",
-    "MooneyRivlin",
-    "Needle",
-    "NeoHookean",
-    "Newmark",
-    "Ogden",
-    "PairHeat",
-    "ParkPaulinoRoesler",
-    "PenaltyContact",
-    "Plane",
-    "PrescribedTemperature",
-    "Pressure",
-    "Prony",
-    "Recording",
-    "Reinforced",
-    "SmoothCoulomb",
-    "Solid",
-    "StVenantKirchhoff",
-    "State",
-    "StepControl",
-    "StepError",
-    "StepReport",
-    "Support",
-    "Surface",
-    "SurfacePair",
-    "TaggedMesh",
-    "Temperature",
-    "ThermoElastic",
-    "ThermoMechanics",
-    "Tolerances",
-    "ToolContact",
-    "ToolHeat",
-    "ToolParts",
-    "ToolPath",
-    "Traction",
-    "TransverselyIsotropic",
-    "TriangulatedTool",
-    "Triangulation",
-    "Yeoh",
-    "cracked_block",
-    "cracked_space",
-    "draw_body",
-    "draw_insertion",
-    "draw_stress",
-    "geometry",
-    "laminate",
-    "piecewise_direction",
-    "plot_curves",
-    "plot_energy",
-    "plot_parts",
-    "read_geo",
-    "read_history",
-    "read_msh",
-    "run",
-    "tag_mesh",
-]
+from .analysis.mechanics import Mechanics as Mechanics
+from .analysis.staggered import ThermoMechanics as ThermoMechanics
+from .analysis.stepping import StepControl as StepControl
+from .analysis.stepping import StepError as StepError
+from .analysis.stepping import StepReport as StepReport
+from .analysis.stepping import run as run
+from .bodies.loads import Pressure as Pressure
+from .bodies.loads import Support as Support
+from .bodies.loads import Traction as Traction
+from .bodies.schemes import GeneralisedAlpha as GeneralisedAlpha
+from .bodies.schemes import Newmark as Newmark
+from .bodies.solid import Solid as Solid
+from .fields.laminate import laminate as laminate
+from .fields.meshing import TaggedMesh as TaggedMesh
+from .fields.meshing import geometry as geometry
+from .fields.meshing import read_geo as read_geo
+from .fields.meshing import read_msh as read_msh
+from .fields.meshing import tag_mesh as tag_mesh
+from .fields.points import Surface as Surface
+from .fields.space import cracked_space as cracked_space
+from .fields.state import State as State
+from .fields.temperature import Temperature as Temperature
+from .heat.boundary import Convection as Convection
+from .heat.boundary import HeatFlux as HeatFlux
+from .heat.boundary import PrescribedTemperature as PrescribedTemperature
+from .heat.conduction import HeatBody as HeatBody
+from .heat.contact_heat import AdiabaticTool as AdiabaticTool
+from .heat.contact_heat import ContactHeat as ContactHeat
+from .heat.interface_heat import InterfaceHeat as InterfaceHeat
+from .heat.pair_heat import PairHeat as PairHeat
+from .heat.tool_heat import ToolHeat as ToolHeat
+from .heat.transfer import HeatTransfer as HeatTransfer
+from .interface.cohesive import Bilinear as Bilinear
+from .interface.cohesive import CohesiveLaw as CohesiveLaw
+from .interface.cohesive import Exponential as Exponential
+from .interface.contact import PenaltyContact as PenaltyContact
+from .interface.crack import Crack as Crack
+from .interface.crack_friction import CrackFriction as CrackFriction
+from .interface.friction import Coulomb as Coulomb
+from .interface.friction import FrictionLaw as FrictionLaw
+from .interface.friction import SmoothCoulomb as SmoothCoulomb
+from .interface.ppr import ParkPaulinoRoesler as ParkPaulinoRoesler
+from .materials.anisotropic import FungOrthotropic as FungOrthotropic
+from .materials.anisotropic import TransverselyIsotropic as TransverselyIsotropic
+from .materials.directions import piecewise_direction as piecewise_direction
+from .materials.elastic import IsochoricNeoHookean as IsochoricNeoHookean
+from .materials.elastic import LinearElastic as LinearElastic
+from .materials.elastic import Material as Material
+from .materials.elastic import NeoHookean as NeoHookean
+from .materials.elastic import StVenantKirchhoff as StVenantKirchhoff
+from .materials.fibres import DispersedFibres as DispersedFibres
+from .materials.fibres import EllipsoidalFibres as EllipsoidalFibres
+from .materials.fibres import ExponentialFibres as ExponentialFibres
+from .materials.fibres import Reinforced as Reinforced
+from .materials.rubbers import ArrudaBoyce as ArrudaBoyce
+from .materials.rubbers import IsochoricOgden as IsochoricOgden
+from .materials.rubbers import MooneyRivlin as MooneyRivlin
+from .materials.rubbers import Ogden as Ogden
+from .materials.rubbers import Yeoh as Yeoh
+from .materials.thermoelastic import ThermoElastic as ThermoElastic
+from .materials.viscoelastic import Prony as Prony
+from .pairs.surface_pair import SurfacePair as SurfacePair
+from .results.output import read_history as read_history
+from .results.pictures import draw_body as draw_body
+from .results.pictures import draw_stress as draw_stress
+from .results.plots import Curve as Curve
+from .results.plots import plot_curves as plot_curves
+from .results.plots import plot_energy as plot_energy
+from .results.plots import plot_parts as plot_parts
+from .results.recording import Recording as Recording
+from .solvers.convergence import Tolerances as Tolerances
+from .studies.body import CrackedBody as CrackedBody
+from .studies.body import cracked_block as cracked_block
+from .studies.drive import Drive as Drive
+from .studies.fixture import Fixture as Fixture
+from .studies.insertion import Insertion as Insertion
+from .studies.layered import Layer as Layer
+from .studies.layered import LayeredBlock as LayeredBlock
+from .studies.picture import draw_insertion as draw_insertion
+from .tools.pointed import Blade as Blade
+from .tools.pointed import Needle as Needle
+from .tools.shapes import Ball as Ball
+from .tools.shapes import FlatPunch as FlatPunch
+from .tools.shapes import Plane as Plane
+from .tools.shapes import ToolPath as ToolPath
+from .tools.tool_contact import ToolContact as ToolContact
+from .tools.tool_parts import ToolParts as ToolParts
+from .tools.triangulated_tool import TriangulatedTool as TriangulatedTool
+from .tools.triangulation import Triangulation as Triangulation
