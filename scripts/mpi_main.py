@@ -1,50 +1,5 @@
-"""Run a script or ``-m module`` on every MPI rank; where one rank fails alone, end all of them.
+"""A rank of an MPI run; see cutsim/commands/rank.py."""
 
-``python -m mpi4py`` aborts only when MPI is finalised, which a failed rank never reaches here:
-PETSc is finalised first, and that waits for the ranks that still compute.
-"""
+from cutsim.commands.rank import main
 
-import signal
-import sys
-import time
-import traceback
-
-from mpi4py import MPI
-from mpi4py.run import run_command_line
-
-GRACE = 3.0  # seconds for the other ranks to fail in the same way, as they do on bad input
-
-
-def end_together(comm: MPI.Comm) -> None:
-    """Return if all ranks come here within the grace period, else abort them."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    arrived = comm.Ibarrier()
-    deadline = time.monotonic() + GRACE
-    while not arrived.Test():
-        if time.monotonic() > deadline:
-            MPI.COMM_WORLD.Abort(1)
-        time.sleep(0.01)
-
-
-if __name__ == "__main__":
-    # mpirun passes this signal on, and kills the ranks where it gets SIGTERM itself.
-    signal.signal(signal.SIGUSR1, lambda number, frame: signal.raise_signal(signal.SIGTERM))
-    comm = MPI.COMM_WORLD.Dup()  # its messages mix with no others
-    try:
-        run_command_line(sys.argv[1:])
-    except SystemExit as end:
-        if isinstance(end.code, str):
-            print(end.code, file=sys.stderr)
-        if end.code:
-            end_together(comm)
-            sys.exit(end.code if isinstance(end.code, int) else 1)
-    except KeyboardInterrupt as end:
-        if comm.rank == 0:
-            print(f"{type(end).__name__}: {end}", file=sys.stderr)
-        end_together(comm)
-        sys.exit(130)
-    except BaseException:
-        traceback.print_exc()
-        end_together(comm)
-        sys.exit(1)
+main()

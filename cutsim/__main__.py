@@ -1,0 +1,5 @@
+"""The command `cutsim` as ``python -m cutsim``."""
+
+from cutsim.commands.main import main
+
+main()

@@ -1,0 +1,69 @@
+"""The command `cutsim`."""
+
+from __future__ import annotations
+
+import logging
+import os
+from types import ModuleType
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+import cutsim
+from cutsim.commands import doctor, launch
+from cutsim.commands.endings import endings
+from cutsim.commands.options import show_messages
+
+#: Heading of the help → commands: name → module with the function `command` and its `EXAMPLES`.
+COMMANDS: dict[str, dict[str, ModuleType]] = {
+    "Help": {"doctor": doctor},
+}
+
+
+class _Commands(TyperGroup):
+    """The commands, whose errors end the program as its exit codes say."""
+
+    def invoke(self, ctx: Any) -> Any:
+        with endings():
+            return super().invoke(ctx)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        print(f"cutsim {cutsim.__version__}")
+        raise typer.Exit
+
+
+def prepare(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version and end.")
+    ] = False,
+) -> None:
+    """Cutting, tearing and penetration of soft solids by blades and needles: simulate a case, look at it, fit it.
+
+    A case is a file that says all of a simulation; `cutsim cases` lists those that come with the program.
+    """
+    os.environ.update(launch.environment())  # before a library that starts threads is loaded
+    show_messages(logging.WARNING)
+
+
+app = typer.Typer(
+    name="cutsim",
+    cls=_Commands,
+    callback=prepare,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: 0 trusted, 1 questionable, 2 bad input, 3 no equilibrium, 4 cannot write, 130 interrupted.",
+)
+for panel, commands in COMMANDS.items():
+    for name, module in commands.items():
+        epilog = "\n\n".join(["[bold]Examples[/bold]", *(f"  $ {example}" for example in module.EXAMPLES)])
+        app.command(name, epilog=epilog, rich_help_panel=panel)(module.command)
+
+
+def main() -> None:
+    """Run the command as the arguments of the program say."""
+    app(prog_name="cutsim")

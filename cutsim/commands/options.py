@@ -1,0 +1,76 @@
+"""Options that several commands take, and what they set."""
+
+from __future__ import annotations
+
+import logging
+import sys
+from typing import Annotated
+
+import typer
+
+from cutsim.commands import launch
+
+logger = logging.getLogger("cutsim")
+
+
+class Messages(logging.Handler):
+    """Handler that looks up the standard error stream each time: a progress bar replaces it while it is shown."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a message in a line."""
+        print(self.format(record), file=sys.stderr)
+
+
+def show_messages(level: int) -> None:
+    """Show what the package has to say from a level on, and nothing below it."""
+    handler = Messages()
+    handler.setFormatter(
+        logging.Formatter(
+            "%(levelname)s: %(message)s" if level > logging.DEBUG else "%(levelname)s: %(name)s: %(message)s"
+        )
+    )
+    logger.handlers[:] = [handler]
+    logger.propagate = False
+    logger.setLevel(level)
+
+
+def _louder(count: int) -> int:
+    if count:
+        show_messages(logging.INFO if count == 1 else logging.DEBUG)
+    return count
+
+
+def _quieter(quiet: bool) -> bool:
+    if quiet:
+        show_messages(logging.ERROR)
+    return quiet
+
+
+Verbose = Annotated[
+    int,
+    typer.Option(
+        "--verbose",
+        "-v",
+        count=True,
+        callback=_louder,
+        show_default=False,
+        metavar="",
+        help="Say more: decisions of the run; twice: those of the solvers too.",
+    ),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_quieter, help="Say nothing but what is wrong.")]
+Ranks = Annotated[int, typer.Option("-n", "--ranks", min=1, help="MPI ranks on this machine, which are started here.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an older run has left in the folder.")]
+
+
+def on_ranks(ranks: int) -> None:
+    """Go on in this process, or start this command anew on several ranks and end as it ends.
+
+    Args:
+        ranks: How many; ranks that were started go on.
+
+    Raises:
+        typer.Exit: The command has ended on its ranks.
+    """
+    if ranks > 1 and not launch.started():
+        raise typer.Exit(launch.run_on_ranks(["-m", "cutsim", *sys.argv[1:]], ranks))
