@@ -90,8 +90,8 @@ def test_interrupted_ranks_end_after_what_they_do(tmp_path):
     program.write_text(
         "import signal, sys, time\nfrom mpi4py import MPI\nasked = []\n"
         "signal.signal(signal.SIGTERM, lambda *_: asked.append(1))\nMPI.COMM_WORLD.Barrier()\n"
-        "print('ready', flush=True)\n"
-        "while not asked:\n    time.sleep(0.01)\nprint('kept', flush=True)\nsys.exit(130)\n"
+        "sys.stdout.write('ready\\n')\n"
+        "while not asked:\n    time.sleep(0.01)\nsys.stdout.write('kept\\n')\nsys.exit(130)\n"
     )
     job = ranks(program)
     assert [job.stdout.readline() for _ in range(2)] == ["ready\n"] * 2
