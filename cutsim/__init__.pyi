@@ -87,3 +87,5 @@ from .tools.tool_contact import ToolContact as ToolContact
 from .tools.tool_parts import ToolParts as ToolParts
 from .tools.triangulated_tool import TriangulatedTool as TriangulatedTool
 from .tools.triangulation import Triangulation as Triangulation
+
+__version__: str

@@ -1,13 +1,16 @@
 """The command: what it understands, how it ends, and how it starts ranks."""
 
 import errno
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
@@ -19,6 +22,7 @@ from cutsim.commands.endings import Ending, endings
 from cutsim.commands.main import COMMANDS, app
 
 runner = CliRunner()
+COARSE = [0, 1, 2, 3, 4]
 NAMES = [name for commands in COMMANDS.values() for name in commands]
 
 
@@ -120,3 +124,70 @@ def test_start_of_ranks_refuses_nonsense(capsys):
     assert launch.main(["-n", "0", "script.py"]) == 2
     assert "'0'" in capsys.readouterr().err
     assert launch.main([]) == 2
+
+
+# -- results ----------------------------------------------------------------------------------------------------------
+
+
+def make_result(folder, depth, force, *, until=None, verdict="trusted", unit="mm"):
+    """A folder as a run leaves it."""
+    folder.mkdir()
+    rows = [f"depth [{unit}],force [N],cuts", *(f"{d},{f},0" for d, f in zip(depth, force, strict=True))]
+    (folder / "history.csv").write_text("\n".join(rows) + "\n")
+    summary = {"verdict": verdict, "reasons": [], "time": depth[-1], "until": until or depth[-1]}
+    (folder / "summary.json").write_text(json.dumps(summary))
+    return str(folder)
+
+
+def cells(result, start):
+    """Cells of a printed row."""
+    (line,) = [line for line in result.stdout.splitlines() if line.strip().startswith(start)]
+    return line.split()
+
+
+def test_compare_measures_over_the_common_range(tmp_path, monkeypatch):
+    """Straight lines, whose peak, work and distance are known; a measurement in other units, and a run that stopped."""
+    monkeypatch.chdir(tmp_path)
+    whole = make_result(tmp_path / "whole", COARSE, [2 * d for d in COARSE])
+    short = make_result(tmp_path / "short", [0, 1, 2], [0, 3, 6], until=4, verdict="questionable")
+    Path("machine.txt").write_text("made by us\nt;Weg;Kraft\ns;m;kN\n0;0,000;0,000\n1;0,002;0,005\n2;0,006;0,015\n")
+    result = runner.invoke(app, ["compare", whole, short, "machine.txt"])
+    assert result.exit_code == 0, result.output
+    assert "from 0 to 2" in result.stdout
+    assert cells(result, "whole") == ["whole", "trusted", "4", "4"]
+    assert cells(result, "short")[1:] == ["ends", "early", "6", "+50.00%", "6", "+50.00%", "1.15", "28.87%"]
+    assert cells(result, "machine.txt")[1:6] == ["measured", "5", "+25.00%", "5", "+25.00%"]
+    assert Path("compared.png").stat().st_size > 5000
+
+
+def test_compare_refuses_what_has_nothing_in_common(tmp_path):
+    first, other = (make_result(tmp_path / name, [a, a + 1], [0, 1]) for name, a in (("a", 0), ("b", 5)))
+    result = runner.invoke(app, ["compare", first, other, "-o", str(tmp_path / "plot.png")])
+    assert result.exit_code == 2 and "common range of depth" in result.stderr
+    seconds = make_result(tmp_path / "c", [0, 1], [0, 1], unit="s")
+    result = runner.invoke(app, ["compare", first, seconds, "-o", str(tmp_path / "plot.png")])
+    assert result.exit_code == 2 and "cannot be compared" in result.stderr
+
+
+def test_plot_lists_and_draws_columns(tmp_path):
+    folder = make_result(tmp_path / "run", COARSE, COARSE)
+    assert runner.invoke(app, ["plot", folder, "--list"]).stdout == "depth [mm]: 4\nforce [N]: 4\ncuts: 0\n"
+    path = tmp_path / "plot.svg"
+    assert runner.invoke(app, ["plot", folder, "-y", "force", "-o", str(path)]).exit_code == 0
+    assert path.read_text().startswith("<?xml")
+    wrong = runner.invoke(app, ["plot", folder, "-y", "forse"])
+    assert wrong.exit_code == 2 and "depth, force, cuts" in wrong.stderr
+
+
+def test_a_material_is_fitted(tmp_path):
+    stretch = np.linspace(1.0, 1.6, 20)
+    rows = [f"{20 * (s - 1)!r},{24 * 0.5 * (s - s**-2)!r}" for s in map(float, stretch)]
+    (tmp_path / "data.csv").write_text("\n".join(["travel [mm],load [N]", *rows]) + "\n")
+    snippet = tmp_path / "material.toml"
+    arguments = [str(tmp_path / "data.csv"), "--length", "20", "--area", "24", "-o", str(snippet)]
+    result = runner.invoke(app, ["fit-material", *arguments, "--model", "neo-hookean"])
+    assert result.exit_code == 0 and "young = 1.495" in result.stdout
+    material = tomllib.loads(snippet.read_text())["material"]
+    assert material["model"] == "neo-hookean" and material["young"] == pytest.approx(1.495)  # 2 (1 + nu) 0.5
+    assert snippet.with_suffix(".png").exists()
+    assert runner.invoke(app, ["fit-material", *arguments, "--model", "neo"]).exit_code == 2

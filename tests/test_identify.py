@@ -16,11 +16,13 @@ from cutsim.identify import (
     converted,
     fit_material,
     fit_shear_modulus,
+    fitting_columns,
     layer_factor,
     nominal_stress,
     poisson_ratio,
     punch_force,
     read_table,
+    titled_units,
     unstable_stretches,
 )
 from cutsim.identify.fitting import Fit, fit_model
@@ -70,6 +72,33 @@ def test_table_in_the_units_of_the_run(tmp_path):
         data = table(tmp_path, text, skip=skip, increasing="strain")
         np.testing.assert_allclose(data["force"], [1.0, 3.0])
         np.testing.assert_allclose(data["strain"], [0.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("text", "units"),
+    [
+        ("depth [mm],force [N],n\n0,1,2\n1,2,3\n", {"depth [mm]": "mm", "force [N]": "N"}),
+        ("made by (us)\nDatum;Kraft\nt;Weg in mm;Kraft (kN)\n0;0,1;2\n", {"Weg in mm": "mm", "Kraft (kN)": "kN"}),
+        ("Travel\tLoad\tNo\n[µm]\tN\t-\n1\t2\t3\n", {"Travel": "µm", "Load": "N"}),
+        ("stretch stress[MPa]\n1 0\n1.1 0.2\n", {"stretch": "1", "stress[MPa]": "MPa"}),
+        ("a,b\n1,2\n2,3\n", {}),
+    ],
+)
+def test_units_that_a_table_gives_itself(tmp_path, text, units):
+    path = tmp_path / "data.csv"
+    path.write_text(text, encoding="utf-8")
+    assert titled_units(path) == units
+
+
+def test_columns_that_fit_a_quantity(tmp_path):
+    path = tmp_path / "data.csv"
+    path.write_text("time [s];Dehnung [%];Weg [mm];Kraft [N];Spannung [MPa]\n0;1;2;3;4\n", encoding="utf-8")
+    assert fitting_columns(path, ("displacement", "force", "strain", "stress")) == {
+        "displacement": ("Weg [mm]", "mm"), "force": ("Kraft [N]", "N"),
+        "strain": ("Dehnung [%]", "%"), "stress": ("Spannung [MPa]", "MPa"),
+    }  # fmt: skip
+    with pytest.raises(ValueError, match=r"Weg \[mm\].* a temperature"):
+        fitting_columns(path, ("temperature",))
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "cp1252"])

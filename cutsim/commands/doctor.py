@@ -19,6 +19,7 @@ from rich.table import Table
 import cutsim
 from cutsim.commands import launch
 from cutsim.commands.endings import Ending
+from cutsim.commands.options import console
 
 EXAMPLES = ("cutsim doctor", "cutsim doctor --no-test")
 _DISTRIBUTIONS = ("numpy", "scipy", "gmsh", "meshio", "pyvista", "h5py", "matplotlib", "plotly", "imageio-ffmpeg")
@@ -40,15 +41,15 @@ def command(
     test: Annotated[bool, typer.Option("--test/--no-test", help="Solve a problem whose answer is known.")] = True,
 ) -> None:
     """Show what is installed, and solve a problem whose answer is known on one rank and on two."""
-    console = Console(highlight=False, soft_wrap=True)
+    screen = console()
     table = Table("what", "found", box=None, header_style="bold")
     for name, words in {**_python(), **_libraries(), **_machine()}.items():
         table.add_row(name, words)
-    console.print(table)
+    screen.print(table)
     if not test:
         return
-    console.print("\nTwo blocks that are glued are pulled apart:")
-    passed = [_tested(console, ranks) for ranks in (1, 2)]
+    screen.print("\nTwo blocks that are glued are pulled apart:")
+    passed = [_tested(screen, ranks) for ranks in (1, 2)]
     if not all(passed):
         raise typer.Exit(Ending.QUESTIONABLE)
 
@@ -103,7 +104,7 @@ def _said(process: subprocess.Popen[str]) -> str:
     return f"MISSING: {(trouble.strip().splitlines() or [f'exit status {process.returncode}'])[-1]}"
 
 
-def _tested(console: Console, ranks: int) -> bool:
+def _tested(screen: Console, ranks: int) -> bool:
     """Whether the self-test gives what is known."""
     try:
         words = _said(
@@ -114,10 +115,10 @@ def _tested(console: Console, ranks: int) -> bool:
         result = json.loads(words.splitlines()[-1])
         errors = result["peak"] / _PEAK - 1, result["energy"] / _ENERGY - 1
     except (ValueError, IndexError):
-        console.print(f"  {ranks} rank(s): FAILED: {words}", markup=False)
+        screen.print(f"  {ranks} rank(s): FAILED: {words}", markup=False)
         return False
     passed = result["ranks"] == ranks and all(abs(error) < _TOLERANCE for error in errors)
-    console.print(
+    screen.print(
         f"  {ranks} rank(s): {'passed' if passed else 'FAILED'}: peak of the force {errors[0]:+.2%},"
         f" energy of the new surface {errors[1]:+.2%} off what is known",
         markup=False,

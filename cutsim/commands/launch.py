@@ -52,6 +52,8 @@ def environment() -> dict[str, str]:
     library = Path(sys.prefix, "lib")
     if (library / "libmpi.so").exists():
         values["LD_LIBRARY_PATH"] = os.pathsep.join(filter(None, (str(library), values.get("LD_LIBRARY_PATH"))))
+    # PETSc is to leave signals to Python: without it a closed pipe or SIGTERM ends in a page of error messages.
+    values["PETSC_OPTIONS"] = f"{values.get('PETSC_OPTIONS', '')} -no_signal_handler".lstrip()
     # With an empty HOME caches would lie below /, and without one the writers of ADIOS2 crash: take the account's.
     if not values.get("HOME"):
         values.pop("HOME", None)

@@ -7,6 +7,7 @@ import sys
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from cutsim.commands import launch
 
@@ -61,6 +62,14 @@ Verbose = Annotated[
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_quieter, help="Say nothing but what is wrong.")]
 Ranks = Annotated[int, typer.Option("-n", "--ranks", min=1, help="MPI ranks on this machine, which are started here.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an older run has left in the folder.")]
+
+
+def console() -> Console:
+    """Where commands write: a file gets lines of any length."""
+    screen = Console(highlight=False, soft_wrap=True)
+    if not screen.is_terminal:
+        screen.width = 10_000
+    return screen
 
 
 def on_ranks(ranks: int) -> None:

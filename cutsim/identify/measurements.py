@@ -7,7 +7,9 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
+from tokenize import TokenError
 from typing import Literal
 
 import numpy as np
@@ -115,6 +117,80 @@ def read_table(
 
 
 @checked
+def titled_units(path: Path | str) -> dict[str, str]:
+    """Columns of a text file whose unit it gives itself: in brackets, after "in", or in a line below the titles.
+
+    Args:
+        path: The file, in one of the forms that `read_table` reads.
+
+    Returns:
+        Title -> unit, such as ``{"Standard force [kN]": "kN"}``; "1" for a strain or a stretch without a unit.
+
+    Raises:
+        ValueError: The file is no text.
+        OSError: The file cannot be read.
+    """
+    text, found = _text(path), dict[str, str]()
+    for choice in _DELIMITERS:
+        lines = [cells for _, cells in _cut(text, choice, 0)]
+        head = list(takewhile(lambda cells: not all(map(_is_number, filter(None, cells))), lines))
+        for titles, below in zip(head, [*head[1:], []], strict=True):
+            units = _units_in(titles) | _units_below(titles, below)
+            found = max(found, units, key=len)
+    return found
+
+
+def fitting_columns(path: Path | str, quantities: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """The columns of a text file that can be meant by some quantities, in the form in which `read_table` takes them.
+
+    Args:
+        path: The file, which has to give the units (see `titled_units`).
+        quantities: Names of quantities: of each, the first column that fits is taken. A strain or a stretch must be
+            called so, or a strain be in per cent.
+
+    Raises:
+        ValueError: There is no such column; the message says what there is.
+    """
+    known = titled_units(path)
+    found = {}
+    for quantity in quantities:
+        fitting = [title for title, unit in known.items() if _fits(quantity, title, unit)]
+        columns = ", ".join(known) or "none with a unit"
+        require(f"columns of {path}", columns, bool(fitting), f"such that one of them is a {quantity}, with its unit")
+        found[quantity] = fitting[0], known[fitting[0]]
+    return found
+
+
+def _fits(quantity: str, title: str, unit: str) -> bool:
+    one, dimension = _quantity(np.ones(1), unit), _DIMENSIONS[quantity]
+    named = dimension != "[]" or quantity in title.lower() or (quantity == "strain" and unit == "%")
+    return one is not None and bool(one.check(dimension)) and named
+
+
+def _units_in(titles: Sequence[str]) -> dict[str, str]:
+    """Titles that give their unit, or need none."""
+    found = {}
+    for title in titles:
+        written = re.search(r"[\[(]([^\[(]+)[\])]$|\sin\s(\S+)$", title)
+        unit = next(filter(None, written.groups())) if written else ""
+        if unit and _is_unit(unit):
+            found[title] = unit
+        elif any(name in title.lower() for name in ("strain", "stretch")):
+            found[title] = "1"
+    return found
+
+
+def _units_below(titles: Sequence[str], below: Sequence[str]) -> dict[str, str]:
+    """Titles whose units are in the line below them."""
+    pairs = zip(titles, map(_bare, below), strict=False)
+    return {title: unit for title, unit in pairs if title and unit not in _NO_UNIT and _is_unit(unit)}
+
+
+def _is_number(cell: str) -> bool:
+    return re.match(r"[+\-−]?[.,]?\d", cell) is not None
+
+
+@checked
 def converted(values: ArrayLike, unit: str, units: Units, name: str = "unit") -> NDArray[np.float64]:
     """Numbers of any unit in the consistent units of a run.
 
@@ -141,7 +217,7 @@ def _quantity(values: NDArray[np.float64], unit: str) -> pint.Quantity | None:
     try:
         quantity = pint.get_application_registry().Quantity(values, unit)
         return quantity if set(quantity.dimensionality) <= set(_POWERS) else None
-    except (pint.PintError, AttributeError, TypeError, ValueError):
+    except (pint.PintError, TokenError, AttributeError, TypeError, ValueError):
         return None
 
 

@@ -1,0 +1,121 @@
+"""``cutsim compare``: curves of runs and of measurements over each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from cutsim.commands.options import console
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from cutsim.commands.folders import Source
+
+    Numbers = NDArray[np.float64]
+
+EXAMPLES = (
+    "cutsim compare results/blade measured.csv",
+    "cutsim compare results/fine results/coarse -o compared.pdf",
+    'cutsim compare results/blade machine.txt --csv-x "Standard travel:mm" --csv-y "Standard force:kN"',
+)
+
+
+def command(
+    sources: Annotated[list[Path], typer.Argument(metavar="A B…", help="Folders of runs, and files of measurements.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Plot: png, svg or pdf.")] = Path("compared.png"),
+    x: Annotated[str | None, typer.Option(help="Column of the abscissae of runs; depth or displacement.")] = None,
+    y: Annotated[str | None, typer.Option(help="Column of the ordinates of runs; the force.")] = None,
+    csv_x: Annotated[
+        str | None, typer.Option(help="Column of the abscissae in files: 'title' or 'title:unit'.")
+    ] = None,
+    csv_y: Annotated[
+        str | None, typer.Option(help="Column of the ordinates in files: 'title' or 'title:unit'.")
+    ] = None,
+) -> None:
+    """Overlay force over displacement of runs and measurements, and list by how much they differ from the first.
+
+    Measured files give their units in the header, such as "force [kN]", or in a line below it. Peak, work and
+    difference are those of the range that all curves have in common.
+    """
+    from cutsim.commands.folders import read_sources
+
+    found = read_sources(sources, (x, y), (csv_x, csv_y))
+    table = _differences(found)
+    plot_sources(output, found)
+    screen = console()
+    screen.print(table)
+    screen.print(f"written: {output}", markup=False)
+
+
+def plot_sources(path: Path, sources: list[Source], title: str = "") -> None:
+    """Plot curves over each other in the units of the first; one that ends early is dashed, a measured one dotted.
+
+    Args:
+        path: The file.
+        sources: The curves.
+        title: Text above the plot.
+
+    Raises:
+        ValueError: The units of a curve are those of another quantity.
+    """
+    from cutsim.results.plots import Curve, plot_curves
+
+    first = sources[0]
+    curves = [
+        Curve(
+            s.x.in_unit(first.x.unit),
+            s.y.in_unit(first.y.unit),
+            s.label if s.verdict in ("trusted", "measured") else f"{s.label}: {s.verdict}",
+            ":" if s.verdict == "measured" else "-" if s.verdict == "trusted" else "--",
+            partial=not s.complete,
+        )
+        for s in sources
+    ]
+    plot_curves(path, curves, xlabel=first.x.label, ylabel=first.y.label, title=title)
+
+
+def _differences(sources: list[Source]) -> Table:
+    """Peak, work and difference of each curve over the range that they have in common."""
+    import numpy as np
+
+    first = sources[0]
+    x, curves = _sampled(sources)
+    unit, work = first.y.unit, f"{first.y.unit}·{first.x.unit}"
+    table = Table("curve", "verdict", f"peak [{unit}]", "", f"work [{work}]", "", f"rms [{unit}]", "", box=None)
+    table.caption = f"{first.x.label} from {x[0]:.4g} to {x[-1]:.4g}; each beside the first"
+    table.caption_justify, table.header_style = "left", "bold"
+    for source, y in zip(sources, curves, strict=True):
+        off = y - curves[0]  # linear between the abscissae
+        squares = (off[1:] ** 2 + off[1:] * off[:-1] + off[:-1] ** 2) / 3
+        rms = np.sqrt(squares @ np.diff(x) / (x[-1] - x[0]))
+        cells = [source.label, source.verdict]
+        for value, base in ((y.max(), curves[0].max()), (np.trapezoid(y, x), np.trapezoid(curves[0], x))):
+            cells += [f"{value:.5g}", f"{value / base - 1:+.2%}" if base and source is not first else ""]
+        table.add_row(*cells, *([f"{rms:.3g}", f"{rms / curves[0].max():.2%}"] if source is not first else ["", ""]))
+    return table
+
+
+def _sampled(sources: list[Source]) -> tuple[Numbers, list[Numbers]]:
+    """Abscissae of all curves in the range that they have in common, and the ordinates of each there.
+
+    Of a curve that goes to and fro it is the first way.
+    """
+    import numpy as np
+
+    from cutsim.base.checks import require
+
+    curves = []
+    for source in sources:
+        x, y = source.x.in_unit(sources[0].x.unit), source.y.in_unit(sources[0].y.unit)
+        further = np.flatnonzero(np.diff(np.maximum.accumulate(x), prepend=-np.inf) > 0)
+        curves.append((x[further], y[further]))
+    low, high = max(x[0] for x, _ in curves), min(x[-1] for x, _ in curves)
+    require(f"common range of {sources[0].x.name}", (low, high), bool(low < high), "of some length")
+    everywhere = np.unique(np.concatenate([x for x, _ in curves]))
+    grid = everywhere[(everywhere >= low) & (everywhere <= high)]
+    return grid, [np.interp(grid, x, y) for x, y in curves]
