@@ -17,7 +17,7 @@ WIDE = {
     "results.pictures.draw_body": 13,
     "identify.inverse.fit_simulation": 11,
     "bodies.solid.Solid.__init__": 11,
-    "commands.fit_material.command": 11,
+    "commands.fit_material.command": 10,
     "results.recording.Recording.__init__": 10,
     "analysis.mechanics.Mechanics.__init__": 10,
     "interface.crack.Crack.__init__": 10,
