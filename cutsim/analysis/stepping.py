@@ -19,6 +19,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
+from cutsim.base.units import Time
 from cutsim.fields.state import State
 from cutsim.solvers.iterations import LINE_SEARCHES, Outcome
 
@@ -192,9 +193,9 @@ class StepControl:
         ValueError: A value is outside its range.
     """
 
-    first: float
-    largest: float
-    smallest: float = 0.0
+    first: Time
+    largest: Time
+    smallest: Time = 0.0
     growth: float = 1.4
     cut: float = 0.5
     easy: int = 6

@@ -14,6 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 
+class Refused(ValueError):
+    """Raised for a parameter that is not allowed.
+
+    Args:
+        name: Name of the parameter as the user wrote it.
+        value: Its value.
+        allowed: What is admissible, in words that complete "must be …".
+    """
+
+    def __init__(self, name: str, value: Any, allowed: str) -> None:
+        super().__init__(f"{name} = {value!r} is not allowed: it must be {allowed}")
+        self.name, self.value, self.allowed = name, value, allowed
+
+    def __reduce__(self) -> tuple[type["Refused"], tuple[str, Any, str]]:
+        return type(self), (self.name, self.value, self.allowed)
+
+
 def require(name: str, value: Any, valid: bool, allowed: str) -> None:
     """Refuse a parameter.
 
@@ -24,10 +41,10 @@ def require(name: str, value: Any, valid: bool, allowed: str) -> None:
         allowed: What is admissible, in words that complete "must be …".
 
     Raises:
-        ValueError: ``valid`` is false.
+        Refused: A ValueError; ``valid`` is false.
     """
     if not valid:
-        raise ValueError(f"{name} = {value!r} is not allowed: it must be {allowed}")
+        raise Refused(name, value, allowed)
 
 
 def place(x: Iterable[float]) -> str:

@@ -8,6 +8,8 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 import numpy as np
 
+from cutsim.base.checks import Refused
+
 Checked = TypeVar("Checked", bound=Callable[..., Any])
 
 #: What `require_number` and its like look at, since only they know the range.
@@ -42,7 +44,7 @@ def checked(target: Checked) -> Checked:
             raise TypeError(f"{target.__qualname__.removesuffix('.__init__')}: {error}") from None
         for name, value in given.items():
             if name in hints and not _fits(value, hints[name]):
-                raise ValueError(f"{name} = {value!r} is not allowed: it must be {_words(hints[name])}")
+                raise Refused(name, value, _words(hints[name]))
         return target(*args, **kwargs)
 
     return call  # type: ignore[return-value]

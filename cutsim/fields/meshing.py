@@ -94,10 +94,15 @@ def geometry(name: str) -> Path:
     Raises:
         ValueError: If there is none of this name.
     """
-    known = {path.stem: path for path in sorted(_GEOMETRIES.glob("*.geo")) if path.stem != "common"}  # macros
+    known = geometries()
     if name not in known:
         raise ValueError(f"name = {name!r} is no geometry of cutsim; known: {', '.join(known) or 'none'}")
     return known[name]
+
+
+def geometries() -> dict[str, Path]:
+    """The parametrised gmsh geometries that come with cutsim, by name."""
+    return {path.stem: path for path in sorted(_GEOMETRIES.glob("*.geo")) if path.stem != "common"}  # macros
 
 
 @checked

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import between, nonnegative, positive, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Conductance, ConductancePerPressure, HeatCapacityPerArea
 from cutsim.fields.points import Values
 
 
@@ -52,10 +53,10 @@ class ContactHeat:
         ValueError: A value is outside its range.
     """
 
-    gamma_plus: float
-    gamma_minus: float
-    capacity: float = 0.0
-    gap_conductance: float = 0.0
+    gamma_plus: ConductancePerPressure
+    gamma_minus: ConductancePerPressure
+    capacity: HeatCapacityPerArea = 0.0
+    gap_conductance: Conductance = 0.0
     fracture_fraction: float = 1.0
 
     def __post_init__(self) -> None:

@@ -16,6 +16,7 @@ from cutsim.base.checks import above, between, positive, require_number
 from cutsim.base.functions import exp, if_less, larger, log, sqrt
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Length, Stiffness, Stress, Toughness
 
 _BROKEN = 1e-300  # secant over the intact one that stands for nothing
 _REST = 1e-16  # keeps the derivative of a root finite where it vanishes
@@ -50,7 +51,7 @@ class CohesiveLaw(Protocol):
 
 
 def strength_and_opening(
-    strength: float | None, opening: float | None, toughness: float | None, factor: float, mode: str = ""
+    strength: Stress | None, opening: Length | None, toughness: Toughness | None, factor: float, mode: str = ""
 ) -> tuple[float, float]:
     """Complete one mode of a law: toughness = factor · strength · opening.
 
@@ -112,20 +113,20 @@ class Exponential:
         ValueError: Values are missing, not positive, or contradict each other.
     """
 
-    strength: float
-    opening: float
-    shear_strength: float
-    shear_opening: float
+    strength: Stress
+    opening: Length
+    shear_strength: Stress
+    shear_opening: Length
 
     def __init__(
         self,
-        strength: float | None = None,
-        opening: float | None = None,
-        shear_strength: float | None = None,
-        shear_opening: float | None = None,
+        strength: Stress | None = None,
+        opening: Length | None = None,
+        shear_strength: Stress | None = None,
+        shear_opening: Length | None = None,
         *,
-        toughness: float | None = None,
-        shear_toughness: float | None = None,
+        toughness: Toughness | None = None,
+        shear_toughness: Toughness | None = None,
     ) -> None:
         normal = strength_and_opening(strength, opening, toughness, e)
         if shear_strength is None and shear_opening is None and shear_toughness is None:
@@ -164,8 +165,8 @@ class Exponential:
 class ByToughness:
     """Base of laws whose parameters are a strength and a toughness in each mode."""
 
-    strength: float
-    toughness: float
+    strength: Stress
+    toughness: Toughness
 
     @property
     def opening(self) -> float:
@@ -199,13 +200,13 @@ class Bilinear(ByToughness):
         ValueError: A value is not positive, or a stiffness so small that the bond would be broken before its peak.
     """
 
-    penalty: float
-    strength: float
-    toughness: float
-    shear_strength: float
-    shear_toughness: float
+    penalty: Stiffness
+    strength: Stress
+    toughness: Toughness
+    shear_strength: Stress
+    shear_toughness: Toughness
     eta: float = 2.0
-    shear_penalty: float | None = None
+    shear_penalty: Stiffness | None = None
 
     def __post_init__(self) -> None:
         for name in ("penalty", "strength", "toughness", "shear_strength", "shear_toughness", "eta"):
@@ -221,11 +222,11 @@ class Bilinear(ByToughness):
     @checked
     def proportional(
         cls,
-        penalty: float,
-        strength: float,
-        toughness: float,
-        shear_strength: float,
-        shear_toughness: float,
+        penalty: Stiffness,
+        strength: Stress,
+        toughness: Toughness,
+        shear_strength: Stress,
+        shear_toughness: Toughness,
         eta: float = 2.0,
     ) -> "Bilinear":
         """Make the law whose modes rise and soften in proportion, K_t = K (G_I/G_II) (t_t/t_n)² (Turon et al. 2010).
@@ -250,10 +251,10 @@ class Bilinear(ByToughness):
     @checked
     def rigid(
         cls,
-        strength: float,
-        toughness: float,
-        shear_strength: float,
-        shear_toughness: float,
+        strength: Stress,
+        toughness: Toughness,
+        shear_strength: Stress,
+        shear_toughness: Toughness,
         eta: float = 2.0,
         rise: float = 0.01,
     ) -> "Bilinear":

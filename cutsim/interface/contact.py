@@ -8,6 +8,7 @@ from cutsim.base.checks import nonnegative, positive, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Length, Stiffness
 
 
 @checked
@@ -26,8 +27,8 @@ class PenaltyContact:
         ValueError: A value is outside its range.
     """
 
-    stiffness: float
-    blend: float = 0.0
+    stiffness: Stiffness
+    blend: Length = 0.0
 
     def __post_init__(self) -> None:
         require_number("stiffness", self.stiffness, positive)

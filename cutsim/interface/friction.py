@@ -13,6 +13,7 @@ from cutsim.base.checks import above, finite, nonnegative, positive, require, re
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import InterfaceViscosity, Length, Stiffness, TemperatureValue
 
 # far below any slip, so that directions are differentiable at rest [length]
 _REST = 1e-20
@@ -60,10 +61,10 @@ class Coulomb:
     """
 
     mu: float
-    stiffness: float | None = None
-    viscosity: float = 0.0
-    T_ref: float | None = None
-    T_damage: float | None = None
+    stiffness: Stiffness | None = None
+    viscosity: InterfaceViscosity = 0.0
+    T_ref: TemperatureValue | None = None
+    T_damage: TemperatureValue | None = None
 
     def __post_init__(self) -> None:
         require_number("mu", self.mu, nonnegative)
@@ -119,7 +120,7 @@ class SmoothCoulomb:
     """
 
     mu: float
-    slip: float
+    slip: Length
 
     def __post_init__(self) -> None:
         require_number("mu", self.mu, nonnegative)

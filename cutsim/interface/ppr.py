@@ -6,6 +6,7 @@ from cutsim.base.checks import above, between, positive, require_number
 from cutsim.base.functions import if_less, larger, positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Stress, Toughness
 from cutsim.interface.cohesive import ByToughness
 
 
@@ -33,10 +34,10 @@ class ParkPaulinoRoesler(ByToughness):
         ValueError: A number is outside its range.
     """
 
-    strength: float
-    toughness: float
-    shear_strength: float
-    shear_toughness: float
+    strength: Stress
+    toughness: Toughness
+    shear_strength: Stress
+    shear_toughness: Toughness
     alpha: float = 3.0
     beta: float = 3.0
     peak: float = 0.1

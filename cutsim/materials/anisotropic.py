@@ -8,6 +8,7 @@ import ufl
 from cutsim.base.checks import between, finite, positive, require, require_number, require_numbers
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Stress
 from cutsim.materials.directions import Direction, normalised, require_axes, require_direction, stretches_in
 from cutsim.materials.elastic import WithoutPlaneStress, engineering_constants
 
@@ -36,11 +37,11 @@ class TransverselyIsotropic(WithoutPlaneStress):
     """
 
     direction: Direction
-    young: float
+    young: Stress
     poisson: float
-    axial_young: float
+    axial_young: Stress
     axial_poisson: float
-    axial_shear: float
+    axial_shear: Stress
 
     def __post_init__(self) -> None:
         require_direction("direction", self.direction)
@@ -91,11 +92,11 @@ class FungOrthotropic(WithoutPlaneStress):
         ValueError: A constant is outside its range, or Q is not positive definite.
     """
 
-    modulus: float
+    modulus: Stress
     normal: tuple[float, float, float]
     coupling: tuple[float, float, float]
     shear: tuple[float, float, float]
-    bulk: float
+    bulk: Stress
     axes: tuple[Direction, Direction] = _AXES
 
     def __post_init__(self) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import between, positive, require_number
 from cutsim.base.kinematics import Expr, green_lagrange, small_strain
 from cutsim.base.signatures import checked
+from cutsim.base.units import Stress
 
 
 @runtime_checkable
@@ -76,7 +77,7 @@ class _Isotropic:
         ValueError: A constant is outside its range.
     """
 
-    young: float
+    young: Stress
     poisson: float
 
     def __post_init__(self) -> None:

@@ -16,6 +16,7 @@ from cutsim.base.checks import at_least, between, positive, require, require_num
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Stress
 from cutsim.materials.directions import Direction, require_axes, require_direction, squared_stretch, stretches_in
 from cutsim.materials.elastic import Material, WithoutPlaneStress, isochoric_invariant
 
@@ -80,7 +81,7 @@ class ExponentialFibres:
     """
 
     direction: Direction
-    modulus: float
+    modulus: Stress
     exponential: float
     power: float = 2.0
 
@@ -117,7 +118,7 @@ class DispersedFibres:
     """
 
     direction: Direction
-    k1: float
+    k1: Stress
     k2: float
     dispersion: float = 0.0
 
@@ -160,7 +161,7 @@ class EllipsoidalFibres:
         ValueError: A number is outside its range.
     """
 
-    moduli: tuple[float, float, float]
+    moduli: tuple[Stress, Stress, Stress]
     power: float = 2.0
     axes: tuple[Direction, Direction] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
 

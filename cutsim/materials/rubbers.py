@@ -21,6 +21,7 @@ from cutsim.base.checks import (
 )
 from cutsim.base.kinematics import Expr, right_cauchy_green
 from cutsim.base.signatures import checked
+from cutsim.base.units import Stress
 from cutsim.materials.elastic import WithoutPlaneStress, engineering_constants, isochoric_invariant
 from cutsim.materials.stretches import stretch_power_sums
 
@@ -51,7 +52,7 @@ class _WithModuli(WithoutPlaneStress, ABC):
 class _NearlyIncompressible(_WithModuli):
     """Base of nearly incompressible materials, with the volumetric energy K/2 (ln J)²."""
 
-    bulk: float
+    bulk: Stress
 
     def _bulk(self) -> float:
         return self.bulk
@@ -81,9 +82,9 @@ class MooneyRivlin(_NearlyIncompressible):
         ValueError: A constant is outside its range.
     """
 
-    c1: float
-    c2: float
-    bulk: float
+    c1: Stress
+    c2: Stress
+    bulk: Stress
 
     def __post_init__(self) -> None:
         require_number("c1", self.c1, positive)
@@ -121,10 +122,10 @@ class Yeoh(_NearlyIncompressible):
         ValueError: A constant is outside its range.
     """
 
-    c1: float
-    c2: float
-    c3: float
-    bulk: float
+    c1: Stress
+    c2: Stress
+    c3: Stress
+    bulk: Stress
 
     def __post_init__(self) -> None:
         require_number("c1", self.c1, positive)
@@ -165,9 +166,9 @@ class ArrudaBoyce(_NearlyIncompressible):
         ValueError: A constant is outside its range.
     """
 
-    modulus: float
+    modulus: Stress
     links: float
-    bulk: float
+    bulk: Stress
 
     def __post_init__(self) -> None:
         require_number("modulus", self.modulus, positive)
@@ -202,9 +203,9 @@ class Ogden(_WithModuli):
         ValueError: A constant is outside its range, or there are not as many moduli as exponents.
     """
 
-    moduli: tuple[float, ...]
+    moduli: tuple[Stress, ...]
     exponents: tuple[float, ...]
-    volumetric: float
+    volumetric: Stress
 
     def __post_init__(self) -> None:
         _require_terms(self.moduli, self.exponents)

@@ -7,6 +7,7 @@ import ufl
 from cutsim.base.checks import finite, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Expansion, TemperatureValue
 
 
 @checked
@@ -27,9 +28,9 @@ class ThermoElastic:
         ValueError: A number is not finite.
     """
 
-    expansion: float
-    reference: float
-    softening: float = 0.0
+    expansion: Expansion
+    reference: TemperatureValue
+    softening: Expansion = 0.0
 
     def __post_init__(self) -> None:
         for name in ("expansion", "reference", "softening"):

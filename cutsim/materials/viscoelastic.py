@@ -15,6 +15,7 @@ import numpy as np
 from cutsim.base.arrays import Array
 from cutsim.base.checks import positive, require_numbers
 from cutsim.base.signatures import checked
+from cutsim.base.units import Time
 
 
 @checked
@@ -34,7 +35,7 @@ class Prony:
     """
 
     strengths: tuple[float, ...]
-    times: tuple[float, ...]
+    times: tuple[Time, ...]
 
     def __post_init__(self) -> None:
         require_numbers("strengths", self.strengths, positive)

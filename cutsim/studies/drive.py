@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import above, at_least, between, positive, require, require_number
 from cutsim.base.signatures import checked
+from cutsim.base.units import Length, Time, Velocity
 from cutsim.studies.frame import Frame
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.shapes import ToolPath
@@ -32,9 +33,9 @@ class Drive:
         ValueError: A number is outside its range.
     """
 
-    speed: float
-    entry_time: float | None = None
-    turning_depth: float | None = None
+    speed: Velocity
+    entry_time: Time | None = None
+    turning_depth: Length | None = None
 
     def __post_init__(self) -> None:
         require_number("speed", self.speed, positive)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import finite, require, require_number
 from cutsim.base.parameters import TimeFunction
 from cutsim.base.signatures import checked
+from cutsim.base.units import Length
 from cutsim.bodies.loads import Support
 from cutsim.studies.body import CrackedBody
 from cutsim.studies.frame import FLAT, Array, Facets, Frame
@@ -44,7 +45,7 @@ class Fixture:
     symmetry: str = "symmetry"
     walls: tuple[str, ...] = ()
     ends: tuple[str, ...] = ()
-    drawn: float = 0.0
+    drawn: Length = 0.0
     thread: str = "left"
 
     def __post_init__(self) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import count, nonnegative, positive, require, require_number, require_numbers
 from cutsim.base.signatures import checked
+from cutsim.base.units import Length
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh
 from cutsim.fields.state import State
@@ -41,7 +42,7 @@ class Layer:
     """
 
     name: str
-    thickness: float
+    thickness: Length
     material: Material
     law: CohesiveLaw
     solid: Mapping[str, Any] = field(default_factory=dict)

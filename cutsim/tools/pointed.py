@@ -13,6 +13,7 @@ from cutsim.base.checks import above, between, positive, require, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Angle, Length
 from cutsim.interface.contact import PenaltyContact
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit_vector
 
@@ -54,8 +55,8 @@ class Pointed(ABC):
 
     directions: ClassVar[tuple[str, ...]] = ("push", "lateral")
 
-    half_angle: float
-    tip_radius: float
+    half_angle: Angle
+    tip_radius: Length
     push: Direction
     lateral: Direction | None
     side: int
@@ -158,9 +159,9 @@ class Blade(Pointed):
     round: ClassVar[bool] = False
     firmness: ClassVar[tuple[float, float]] = (5.0, 0.4)
 
-    half_angle: float
-    tip_radius: float
-    half_thickness: float
+    half_angle: Angle
+    tip_radius: Length
+    half_thickness: Length
     push: Direction = (0.0, -1.0)
     lateral: Direction = (1.0, 0.0)
     side: int = 0
@@ -201,9 +202,9 @@ class Needle(Pointed):
     round: ClassVar[bool] = True
     firmness: ClassVar[tuple[float, float]] = (20.0, 0.1)  # pressed harder than a blade, all along its shaft
 
-    half_angle: float
-    tip_radius: float
-    radius: float
+    half_angle: Angle
+    tip_radius: Length
+    radius: Length
     push: Direction = (0.0, -1.0)
     lateral: Direction | None = None
     side: int = 0

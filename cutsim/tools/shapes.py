@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import above, as_array, positive, require, require_number, require_numbers
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
+from cutsim.base.units import Length
 
 Direction = tuple[float, ...]
 
@@ -107,7 +108,7 @@ class Ball:
 
     directions: ClassVar[tuple[str, ...]] = ("axis",)
 
-    radius: float
+    radius: Length
     axis: Direction | None = None
 
     def __post_init__(self) -> None:
@@ -142,8 +143,8 @@ class FlatPunch:
 
     directions: ClassVar[tuple[str, ...]] = ("push",)
 
-    radius: float
-    edge_radius: float
+    radius: Length
+    edge_radius: Length
     push: Direction = (0.0, -1.0)
 
     def __post_init__(self) -> None:

@@ -1,0 +1,125 @@
+"""What tables of a case file, each valid by itself, have to have in common."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from cutsim.cases.geometries import LAMINATE
+from cutsim.cases.schema_parts import Tool
+from cutsim.cases.scope import Keys
+
+#: Where something is wrong, what, and the value.
+Problem = tuple[Keys, str, Any]
+
+
+def contradictions(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    """What is wrong between the tables of a case.
+
+    Args:
+        valid: Those tables that are valid by themselves; what concerns others is not looked at.
+    """
+    for check in (_materials, _laws, _layers, _insertion, _end, _tools, _dynamics, _heat):
+        try:
+            yield from check(valid)
+        except KeyError:  # it concerns a table that is not valid
+            continue
+
+
+def _materials(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    if valid["material"] is not None:
+        return
+    if not valid["bodies"] and not valid["layers"]:
+        yield ("material",), "missing, must be given: the material of the body", None
+    parts = [*valid["bodies"].items(), *enumerate(valid["layers"])]
+    for name, part in parts:
+        if part.material is None:
+            table = "layers" if isinstance(name, int) else "bodies"
+            yield (table, name, "material"), "missing, must be given here or as [material] for all", None
+
+
+def _laws(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    if valid["law"] is not None:
+        return
+    for name, crack in valid["cracks"].items():
+        if "law" not in crack.model_fields_set:
+            yield (
+                ("cracks", name, "law"),
+                'missing, must be given here or as [law] for all, or "none" for contact',
+                None,
+            )
+    for i, layer in enumerate(valid["layers"]):
+        if layer.law is None:
+            yield ("layers", i, "law"), "missing, must be given here or as [law] for all", None
+    if valid["insertion"] is not None and not valid["layers"]:
+        yield ("law",), "missing, must be given: the cohesive law of the crack along which the tool is inserted", None
+
+
+def _layers(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    laminate = valid["mesh"].geometry == LAMINATE
+    if laminate and not valid["layers"]:
+        yield ("layers",), f"missing, must be given: the layers of the geometry {LAMINATE!r}", None
+    if valid["layers"] and valid["bodies"]:
+        yield ("bodies",), "not allowed beside [[layers]], each of which is a body", None
+    names = [layer.name for layer in valid["layers"]]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            yield ("layers", i, "name"), "must differ from the names of the other layers", name
+
+
+def _insertion(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    insertion = valid["insertion"]
+    if insertion is None:
+        return
+    for table in ("cracks", "pairs", "supports", "loads"):
+        if valid[table]:
+            yield (table,), "not allowed beside [insertion], which makes its own", None
+    tool = valid["tools"].get(insertion.tool)
+    if tool is None:
+        yield ("insertion", "tool"), "must be the name of a tool, such as that of [tool]", insertion.tool
+    elif not tool.pointed:
+        yield ("insertion", "tool"), "must be a blade or a needle", insertion.tool
+
+
+def _end(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    insertion = valid["insertion"]
+    depth = None if insertion is None else insertion.depth
+    if depth is None and valid["analysis"].until is None:
+        where = "" if insertion is None else ", or depth in [insertion]"
+        yield ("analysis", "until"), f"missing, must be given: the time at which the run ends{where}", None
+    if depth is not None and valid["analysis"].until is not None:
+        yield ("analysis", "until"), "not allowed beside depth in [insertion]", valid["analysis"].until
+
+
+def _tools(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    inserted = None if valid["insertion"] is None else valid["insertion"].tool
+    tools: Mapping[str, Tool] = valid["tools"]
+    for name, tool in tools.items():
+        moved = (tool.position is not None) + (tool.path is not None)
+        if name == inserted:
+            if moved or tool.surfaces:
+                yield ("tools", name), "must have neither surfaces nor position nor path: [insertion] gives them", None
+            continue
+        if not tool.surfaces:
+            yield ("tools", name, "surfaces"), "missing, must be given: what the tool can touch", None
+        if moved != 1:
+            yield ("tools", name, "position"), "must be given, or path, and not both", None
+
+
+def _dynamics(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    if valid["analysis"].type != "dynamic":
+        return
+    if not valid["bodies"] and not valid["layers"]:
+        yield ("bodies", "body", "density"), "missing, must be given for a dynamic analysis", None
+    for name, body in [*valid["bodies"].items(), *enumerate(valid["layers"])]:
+        if body.density is None:
+            table = "layers" if isinstance(name, int) else "bodies"
+            yield (table, name, "density"), "missing, must be given for a dynamic analysis", None
+
+
+def _heat(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    heat, bodies = valid["heat"], valid["bodies"]
+    names = list(bodies) or [layer.name for layer in valid["layers"]] or ["body"]
+    for name in names:
+        if heat is not None and name not in heat.bodies:
+            yield ("heat", "bodies", name), "missing, must be given: conductivity and capacity of this body", None
+        if heat is None and name in bodies and bodies[name].thermoelastic is not None:
+            yield ("bodies", name, "thermoelastic"), "needs [heat], which gives the temperature", None

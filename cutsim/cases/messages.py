@@ -1,0 +1,105 @@
+"""What is wrong with a case file, in plain words, from what pydantic finds."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from cutsim.base.checks import Refused
+from cutsim.cases.document import Document
+from cutsim.cases.scope import Keys, Scope, nearest
+from cutsim.cases.tables import arguments_of
+
+_KINDS = ("model", "shape", "kind")
+_FORMS = {"<single>": "a text or a number", "<list>": "a list in brackets", "<table>": "a table"}
+_WORDS = {
+    "string_type": "must be a text in quotes",
+    "bool_type": "must be true or false",
+    "tuple_type": "must be a list in brackets",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "string_pattern_mismatch": "must be a name of letters, digits, _, - and spaces",
+}
+
+
+def problems(error: ValidationError, document: Document, scope: Scope) -> list[str]:
+    """One line for each thing that is wrong.
+
+    Args:
+        error: What pydantic finds.
+        document: What was validated.
+        scope: With what it was validated.
+    """
+    found = error.errors(include_url=False)
+    return list(dict.fromkeys(_line(details, document, scope) for details in found))
+
+
+def _line(details: ErrorDetails, document: Document, scope: Scope) -> str:
+    keys, node = _keys(details["loc"], document.tables)
+    cause = details.get("ctx", {}).get("error")
+    if isinstance(cause, Refused):
+        return refusal(cause, keys, node, document)
+    if details["type"] in ("missing", "extra_forbidden"):
+        return document.problem(keys, _about_key(keys, document.tables, scope))
+    return document.problem(keys, _about(details), details["input"])
+
+
+def _keys(location: tuple[int | str, ...], tables: Any) -> tuple[Keys, Any]:
+    """Keys of a place that pydantic names, without what it adds, and what is there."""
+    keys: Keys = ()
+    node: Any = tables
+    chosen = False
+    for part in location:
+        if isinstance(part, str) and (part[:1] + part[-1:] in ("<>", "[]")):
+            continue
+        if isinstance(node, Mapping) and not chosen and part in [node.get(kind) for kind in _KINDS]:
+            chosen = True
+            continue
+        if isinstance(part, int) and not isinstance(node, list):  # one where several are allowed
+            continue
+        keys, chosen = (*keys, part), False
+        inside = isinstance(node, Mapping) or (isinstance(node, list) and isinstance(part, int) and part < len(node))
+        node = (node.get(part) if isinstance(node, Mapping) else node[part]) if inside else None
+    return keys, node
+
+
+def refusal(refused: Refused, keys: Keys, node: Any, document: Document) -> str:
+    """What a constructor refuses, at the key that has the name of the parameter."""
+    name, value = refused.name, refused.value
+    if name.isidentifier():
+        keys = (*keys, name)
+        value = node.get(name, value) if isinstance(node, Mapping) else value
+        return document.problem(keys, f"must be {refused.allowed}", value)
+    return document.problem(keys, f"{name} = {value!r} must be {refused.allowed}")
+
+
+def _about_key(keys: Keys, tables: Any, scope: Scope) -> str:
+    """A key that is unknown, or missing."""
+    parent: Any = tables
+    for key in keys[:-1]:
+        parent = parent[key]
+    table, name = scope.tables.get(id(parent)), str(keys[-1])
+    if table is None:
+        return f"must have {len(parent) + 1} entries or more" if isinstance(parent, list) else "is not allowed here"
+    if name in table.model_fields:
+        described = arguments_of(table).get(name) or table.model_fields[name].description or ""
+        return f"missing, must be given{': ' * bool(described)}{described}"
+    return f"unknown key, must be one of {', '.join(table.model_fields)}{nearest(name, table.model_fields)}"
+
+
+def _about(details: ErrorDetails) -> str:
+    kind, context = details["type"], details.get("ctx", {})
+    if kind == "value_error":
+        return str(context["error"])
+    if kind == "literal_error":
+        known = [word.strip("' ") for word in context["expected"].replace(" or ", ", ").split(",")]
+        return f"must be {context['expected']}{nearest(str(details['input']), known)}"
+    if kind in ("too_short", "too_long"):
+        low, high = context.get("min_length"), context.get("max_length")
+        return f"must have {f'at least {low}' if low is not None else f'at most {high}'} entries"
+    if kind == "union_tag_invalid":
+        forms = [words for form, words in _FORMS.items() if form in context["expected_tags"]]
+        return f"must be {' or '.join(forms)}"
+    return _WORDS.get(kind, details["msg"].lower())

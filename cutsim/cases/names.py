@@ -1,0 +1,45 @@
+"""Names in case files that refer to groups of the mesh and to other tables, each checked with its nearest spelling."""
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
+from pydantic_core import CoreSchema, core_schema
+
+
+class Known:
+    """Annotation of a name that has to be known.
+
+    Args:
+        kind: What it names: "groups", "surfaces", or a table of the file such as "bodies".
+    """
+
+    def __init__(self, kind: str) -> None:
+        self.kind = kind
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """How it is read."""
+        return core_schema.with_info_after_validator_function(self._check, core_schema.str_schema(strict=True))
+
+    def _check(self, name: str, info: Any) -> str:
+        known = info.context.names(self.kind)
+        if known is not None and name not in known:
+            raise ValueError(info.context.unknown(self.kind, name, known))
+        return name
+
+
+def _several(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+_SEVERAL = BeforeValidator(_several, json_schema_input_type=str | list[str])
+
+#: A group of cells or facets of the mesh.
+Group = Annotated[str, Known("groups")]
+#: One group or several.
+Groups = Annotated[tuple[Group, ...], _SEVERAL]
+#: Groups of outer facets, and faces of cracks: the name of a crack with + or −, such as "glue+".
+Surfaces = Annotated[tuple[Annotated[str, Known("surfaces")], ...], _SEVERAL]
+BodyName = Annotated[str, Known("bodies")]
+CrackName = Annotated[str, Known("cracks")]
+PairName = Annotated[str, Known("pairs")]
+ToolName = Annotated[str, Known("tools")]

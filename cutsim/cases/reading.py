@@ -1,0 +1,67 @@
+"""Reading of case files: all that is wrong is found before anything is meshed or compiled."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import TypeAdapter, ValidationError
+
+from cutsim.base.units import Units
+from cutsim.cases.case import Case
+from cutsim.cases.contradictions import contradictions
+from cutsim.cases.document import CaseError, Document, load, setting
+from cutsim.cases.messages import problems
+from cutsim.cases.quantities import consistent
+from cutsim.cases.scope import Scope
+from cutsim.cases.tables import FromTable
+
+
+def read_case(path: Path | str, changes: Mapping[str, str] | None = None) -> Case:
+    """Read a case file.
+
+    Args:
+        path: The file.
+        changes: New values by key, with dots, as the option ``--set`` of the command gives them:
+            ``{"tool.friction": "0.3"}``. They win over the file, and it over those that it extends.
+
+    Returns:
+        The case, complete and checked as far as that is possible without a mesh.
+
+    Raises:
+        CaseError: With one line for each thing that is wrong: file and line, key, value, and what is allowed.
+    """
+    document = load(Path(path))
+    for key, text in (changes or {}).items():
+        document = document.changed(setting(key, text))
+    return checked_case(document)
+
+
+def checked_case(document: Document) -> Case:
+    """The case of a document.
+
+    Raises:
+        CaseError: Something is wrong in it.
+    """
+    scope = _scope(document)
+    case, found = None, list[str]()
+    try:
+        case = Case.model_validate(document.tables, context=scope)
+    except ValidationError as error:
+        found += problems(error, document, scope)
+    found += [document.problem(keys, words, value) for keys, words, value in contradictions(scope.valid)]
+    if found or case is None:
+        raise CaseError(list(dict.fromkeys(found)))
+    case._document = document
+    return case
+
+
+_UNITS: TypeAdapter[Units] = TypeAdapter(Annotated[Units, FromTable()])
+
+
+def _scope(document: Document) -> Scope:
+    """Scope of the values of a document; with the usual units if its own are not valid, which is found later."""
+    try:
+        units = consistent(_UNITS.validate_python(document.tables.get("units", {}), context=Scope({}, Units())))
+    except ValueError:
+        units = Units()
+    return Scope(document.tables, units)

@@ -1,0 +1,282 @@
+"""Schema of case files: bodies, cracks, pairs of surfaces, tools, supports and loads."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, Viscosity
+from cutsim.cases.expressions import TimeValue
+from cutsim.cases.names import Group, Groups, Surfaces
+from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
+from cutsim.cases.tables import FORM, Constructed, Flag, FromTable, Table, Varying, With
+from cutsim.materials.thermoelastic import ThermoElastic
+from cutsim.materials.viscoelastic import Prony
+from cutsim.tools.pointed import Pointed
+from cutsim.tools.shapes import Shape
+
+Volumetric = Literal["auto", "full", "reduced", "mixed", "taylor-hood"]
+#: A component, or a vector.
+Direction = Annotated[
+    Annotated[Literal["x", "y", "z"], Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM
+]
+AnyDirection = Annotated[
+    Annotated[Literal["x", "y", "z", "all"], Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM
+]
+Displacement = Annotated[TimeValue, Varying("length")]
+
+
+class Deformable(Table):
+    """What a body and a layer have in common.
+
+    Args:
+        material: Material; by default that of ``[material]``.
+        volumetric: "full" or "reduced" integration of the volumetric part, "mixed" or "taylor-hood" elements; by
+            default reduced for ν ≥ 0.45.
+        viscosity: Kelvin–Voigt viscosity η ≥ 0 [stress·time].
+        relaxation: Prony series by which all but the volumetric part relaxes.
+        density: Mass per reference volume > 0, for dynamics and heat [mass/length³].
+        thermoelastic: Thermal expansion and softening; needs ``[heat]``.
+    """
+
+    material: AnyMaterial | None = None
+    volumetric: Volumetric = "auto"
+    viscosity: Viscosity = 0.0
+    relaxation: Annotated[Prony, FromTable()] | None = None
+    density: Density | None = None
+    thermoelastic: Annotated[ThermoElastic, FromTable()] | None = None
+
+
+class Body(Deformable):
+    """Deformable body.
+
+    Args:
+        cells: Groups of cells that it occupies; by default all.
+        plane: Plane strain or plane stress of a two-dimensional mesh.
+    """
+
+    cells: Groups | None = None
+    plane: Literal["strain", "stress"] = "strain"
+
+
+class Layer(Deformable):
+    """Layer of a block, from the surface downwards.
+
+    Args:
+        name: Its name in messages and output.
+        thickness: Thickness > 0 [length].
+        law: Cohesive law of the crack in it; by default that of ``[law]``.
+    """
+
+    name: str
+    thickness: Length
+    law: Law | None = None
+
+
+class Interface(Table):
+    """What a crack and a pair have in common.
+
+    Args:
+        law: Cohesive law, or "none" for contact only; by default that of ``[law]``.
+        friction: Friction coefficient [–], or a law.
+        contact: Contact law; by default a penalty of 10 E/h.
+        allowed_penetration: If given, the contact is augmented until no point penetrates more than this [length].
+        allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
+            [length].
+        young: Young's modulus for the automatic penalty; by default that of the softest neighbour [stress].
+    """
+
+    law: LawOrNone = None
+    friction: Friction | None = None
+    contact: Contact | None = None
+    allowed_penetration: Length | None = None
+    allowed_slip: Length | None = None
+    young: Stress | None = None
+
+
+class Crack(Interface):
+    """Crack along facets of the mesh.
+
+    Args:
+        facets: Groups of facets.
+        plus: Group of cells on its '+' side, or a direction that points out of them.
+        acts_on: Where friction acts: on the "broken" part of the bond, or wherever there is "contact".
+        normal: Normal of the "current" or of the "reference" configuration (small strain).
+    """
+
+    facets: Groups
+    plus: Annotated[Annotated[Group, Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM]
+    acts_on: Literal["broken", "contact", "tension"] = "broken"
+    normal: Literal["current", "reference"] = "current"
+
+
+class Pair(Interface):
+    """Pair of outer surfaces that touch; their meshes need not match.
+
+    Args:
+        slave: Groups of facets of the finer or softer surface.
+        master: Groups of facets of the other one.
+        small_sliding: Whether each point keeps its partner, as bonds do.
+        two_pass: Whether each surface is slave once.
+        search: Largest distance of a partner; by default the mean size of the slave facets [length].
+    """
+
+    slave: Groups
+    master: Groups
+    small_sliding: Flag = False
+    two_pass: Flag = False
+    search: Length | None = None
+
+
+class Polyline(Table):
+    """Straight motion between points, at rest before the first and after the last time.
+
+    Args:
+        times: Increasing times [time].
+        points: A position for each [length].
+    """
+
+    times: tuple[Time, ...]
+    points: tuple[tuple[Length, ...], ...]
+
+    @model_validator(mode="after")
+    def _as_many(self) -> "Polyline":
+        if len(self.times) != len(self.points) or not self.times:
+            raise ValueError("must have as many points as times, at least one")
+        return self
+
+
+class Saw(Table):
+    """Constant velocity with a sinusoidal draw.
+
+    Args:
+        start: Position at time zero [length].
+        velocity: Feed velocity [length/time].
+        stroke: Full stroke of the sawing motion, a vector [length].
+        period: Duration of a stroke to and fro > 0 [time].
+    """
+
+    start: tuple[Length, ...]
+    velocity: tuple[Velocity, ...]
+    stroke: tuple[Length, ...]
+    period: Time
+
+
+def _motion(value: Any) -> str:
+    return (
+        "<saw>" if isinstance(value, dict) and value.keys() & {"start", "velocity", "stroke", "period"} else "<points>"
+    )
+
+
+Path = Annotated[Annotated[Polyline, Tag("<points>")] | Annotated[Saw, Tag("<saw>")], Discriminator(_motion)]
+
+
+class Tool(Constructed):
+    """Rigid tool.
+
+    Args:
+        friction: Friction coefficient [–], or a law.
+        surfaces: Groups of outer facets, and faces of cracks such as "glue+", that it can touch. A tool that is
+            inserted needs none.
+        position: Position of its reference point, one number or expression in t a component [length].
+        path: Motion of its reference point, as points at times, or as feed with a sawing stroke.
+        corners: Times at which its velocity jumps; those of `path` are known [time].
+        contact: Contact law; by default a penalty of 10 E/h, and that of an inserted tool is its own.
+    """
+
+    friction: Friction = 0.0
+    surfaces: Surfaces = ()
+    position: tuple[Displacement, ...] | None = None
+    path: Path | None = None
+    corners: tuple[Time, ...] = ()
+    contact: Contact | None = None
+
+    @property
+    def pointed(self) -> bool:
+        """Whether it can be inserted."""
+        return isinstance(self._made, Pointed)
+
+
+class SurfaceTool(Tool):
+    """Rigid tool of triangles, or of segments in the plane, from an STL, OBJ or PLY file.
+
+    Args:
+        file: The file, relative to the case file.
+        scale: Length in the units of the case of one unit of the file, > 0.
+        search: Largest distance of a partner; by default the mean size of the facets [length].
+    """
+
+    shape: Literal["surface"]
+    file: str
+    scale: Number = 1.0
+    search: Length | None = None
+
+
+def _tool(value: Any) -> str:
+    return "<surface>" if isinstance(value, dict) and value.get("shape") == "surface" else "<shape>"
+
+
+#: A tool of one of the shapes that cutsim exports, or of a surface from a file.
+AnyTool = Annotated[
+    Annotated[SurfaceTool, Tag("<surface>")] | Annotated[Tool, With(Shape), Tag("<shape>")], Discriminator(_tool)
+]
+
+
+class Support(Table):
+    """Prescribed displacement along one direction, with its reaction.
+
+    Args:
+        facets: Groups of facets that it holds.
+        cells: Groups of cells that it holds.
+        points: Points of which it holds the nearest vertices [length].
+        direction: Along which the displacement is prescribed: "x", "y", "z", a vector, or "all" for each component.
+        value: Displacement [length].
+        corners: Times at which its velocity jumps; those of a table are known [time].
+    """
+
+    facets: Groups = ()
+    cells: Groups = ()
+    points: tuple[tuple[Length, ...], ...] = ()
+    direction: AnyDirection
+    value: Displacement = 0.0
+    corners: tuple[Time, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "Support":
+        if sum(map(bool, (self.facets, self.cells, self.points))) != 1:
+            raise ValueError("must have one of facets, cells and points")
+        return self
+
+
+class Pressure(Table):
+    """Fluid pressure on a part of the boundary, along the current normal.
+
+    Args:
+        facets: Groups of facets.
+        value: Pressure, > 0 pushes on the body [stress].
+        corners: Times at which it has a kink; those of a table are known [time].
+    """
+
+    kind: Literal["pressure"]
+    facets: Groups
+    value: Annotated[TimeValue, Varying("stress")]
+    corners: tuple[Time, ...] = ()
+
+
+class Traction(Table):
+    """Dead traction on a part of the boundary.
+
+    Args:
+        facets: Groups of facets.
+        direction: Direction of the traction: "x", "y", "z", or a vector, whose length does not matter.
+        value: Force per reference area along the direction [stress].
+        corners: Times at which it has a kink; those of a table are known [time].
+    """
+
+    kind: Literal["traction"]
+    facets: Groups
+    direction: Direction
+    value: Annotated[TimeValue, Varying("stress")]
+    corners: tuple[Time, ...] = ()
+
+
+Load = Annotated[Pressure | Traction, Field(discriminator="kind")]

@@ -1,0 +1,135 @@
+"""Schema of case files: the insertion of a tool, analysis, steps, solver and output."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic_core import CoreSchema
+
+from cutsim.analysis.stepping import StepControl
+from cutsim.base.units import Length, Number, Time
+from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
+from cutsim.cases.names import ToolName
+from cutsim.cases.tables import Constructed, Flag, FromTable, Table, Whole, With, annotated, made, table_of
+from cutsim.studies.drive import Drive
+from cutsim.studies.fixture import STANDING, Fixture
+
+
+class Insertion(Constructed):
+    """Insertion of a blade or needle into a body along its crack; the ready-made problem of `Insertion.build`.
+
+    Args:
+        tool: Name of the tool.
+        depth: Depth of the tip at which the run ends [length]; or `until` in ``[analysis]``.
+        push: In which push that is, 2 for the second one of a tool that turns.
+        notch: Depth of the notch in which the tool is inserted, 0 for a body without one [length].
+        groups: Groups of the facets of the crack, of those of the notch, and of the cells on the '+' side of both.
+        fixture: Groups where the tool enters and where the body is held.
+        damping: Kelvin–Voigt viscosity over Young's modulus of every layer [time].
+    """
+
+    tool: ToolName = "tool"
+    depth: Length | None = None
+    push: Whole = 1
+    notch: Length = 0.0
+    groups: tuple[str, str, str] = ("crack", "notch", "right")
+    fixture: Annotated[Fixture, FromTable()] = STANDING
+    damping: Time = 0.0
+
+    @property
+    def drive(self) -> Drive:
+        """Speed and times."""
+        drive: Drive = self.made
+        return drive
+
+
+class Analysis(Table):
+    """Analysis.
+
+    Args:
+        type: Whether inertia is left out or counts.
+        until: Time at which the run ends, where no insertion gives the end [time].
+        scheme: Time integration of a dynamic analysis; the trapezoidal rule by default.
+        mass: Mass matrix of a dynamic analysis.
+    """
+
+    type: Literal["quasi-static", "dynamic"] = "quasi-static"
+    until: Time | None = None
+    scheme: Annotated[Scheme, FromTable()] = TRAPEZOIDAL
+    mass: Literal["consistent", "lumped"] = "consistent"
+
+
+class FixedSteps(Constructed):
+    """Equal steps as long as they converge.
+
+    Args:
+        fixed: Size of each step [time].
+    """
+
+    fixed: Time
+
+    def model_post_init(self, context: Any) -> None:
+        """Make the control."""
+        self._made = StepControl.fixed(self.fixed)
+
+
+def _plain(value: Any) -> Any:
+    if not isinstance(value, str | int | float | bool):
+        raise ValueError("must be a text, a number, true or false")
+    return value
+
+
+Plain = Annotated[Any, AfterValidator(_plain)]
+
+
+class Solver(Table):
+    """Solver.
+
+    Args:
+        rtol: Norm of the out-of-balance forces over the force scale.
+        dtol: Norm of the last step over that of the displacement of the solve; by default no criterion.
+        etol: Work of the out-of-balance forces over that at the start; by default no criterion.
+        petsc: PETSc options without prefix; they win over the presets.
+    """
+
+    rtol: Number = 1e-8
+    dtol: Number | None = None
+    etol: Number | None = None
+    petsc: dict[str, Plain] = Field(default_factory=dict)
+
+
+class Output(Table):
+    """Output.
+
+    Args:
+        every: Fields are written every so many steps; 0 for none.
+        stress: Whether stresses are written.
+        format: Files for ParaView: "vtx" needs ADIOS, "vtu" nothing.
+        animation: Whether an animation is made at the end.
+        report: Whether a report is made at the end.
+    """
+
+    every: Whole = 5
+    stress: Flag = True
+    format: Literal["vtx", "vtu"] = "vtx"
+    animation: Flag = True
+    report: Flag = True
+
+
+class AnySteps:
+    """Annotation of a step control: the parameters of `StepControl`, or equal steps."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
+        """How it is read."""
+        fixed, control = made(FixedSteps), made(table_of(StepControl))
+        either = annotated(fixed, Tag("<fixed>")) | annotated(control, Tag("<control>"))
+        schema: CoreSchema = handler.generate_schema(annotated(either, Discriminator(_steps)))
+        return schema
+
+
+def _steps(value: Any) -> str:
+    return "<fixed>" if isinstance(value, dict) and "fixed" in value else "<control>"
+
+
+#: Insertion whose further keys are the parameters of a `Drive`.
+AnyInsertion = Annotated[Insertion, With(Drive)]
+Steps = Annotated[StepControl, AnySteps()]
