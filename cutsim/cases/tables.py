@@ -242,7 +242,7 @@ def _package(kind: type) -> str:
 @cache
 def classes(protocol: type) -> dict[str, type]:
     """The classes that cutsim exports for a protocol, by their names in case files."""
-    exported = [getattr(cutsim, name) for name in cutsim.__all__]
+    exported = [getattr(cutsim, name) for name in dir(cutsim)]
     found = {}
     for kind in (thing for thing in exported if isinstance(thing, type) and is_dataclass(thing)):
         fitting = [known for known in FAMILIES if _package(known) == _package(kind) and _has(kind, members(known))]
