@@ -43,7 +43,7 @@ def world():
     triangle = cutsim.Triangulation(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), np.array([(0, 1), (1, 2), (2, 0)]))
     return {
         "blocks": b, "state": b.state, "V": b.state.V, "mesh": b.state.mesh, "space": space, "temperature": temperature,
-        "facets": top, "entities": top, "slave_facets": b.face(0, 0.0), "master_facets": b.face(0, 1.0),
+        "facets": top, "entities": top, "vertices": np.arange(1, dtype=np.int32), "slave_facets": b.face(0, 0.0), "master_facets": b.face(0, 1.0),
         "contact": contact, "path": path, "crack": crack, "surface": surface, "surfaces": [surface], "tool": tool,
         "tools": [tool], "pair": pair, "solid": solid, "material": ELASTIC, "matrix": ELASTIC, "mechanics": mechanics,
         "layers": layers, "domain": laminated, "triangle": triangle, "comm": COMM, "body": body,
@@ -127,6 +127,7 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "PenaltyContact.automatic": good(young=1.0, h=1.0, factor=10.0, blend=0.1),
     "Plane": good(normal=(0.0, 1.0)),
     "PrescribedTemperature": good(temperature="@temperature", entities="@entities", value=1.0, dim=1, corners=(1.0,)),
+    "NodalForce": good(state="@state", vertices="@vertices", direction=(0.0, 1.0), factor=always, corners=(1.0,)),
     "Pressure": good(state="@state", facets="@facets", pressure=always, corners=(1.0,)),
     "Prony": good(strengths=(1.0,), times=(1.0,)),
     "Reinforced": good(matrix="@matrix", fibres=(cutsim.DispersedFibres(FIBRE, 1.0, 1.0),)),
@@ -150,7 +151,8 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "ToolContact": good(state="@state", shape=cutsim.Ball(0.3), path="@path", surfaces="@surfaces", contact="@contact"),
     "ToolHeat": good(temperature="@temperature", tool="@tool", law=cutsim.ContactHeat(1.0, 1.0), tool_temperature=1.0),
     "ToolParts": good(tools="@tools", shape=cutsim.Blade(0.3, 0.05, 0.1)),
-    "Traction": good(state="@state", facets="@facets", direction=(0.0, 1.0), factor=always, corners=(1.0,)),
+    "Traction": good(state="@state", facets="@facets", direction=(0.0, 1.0), factor=always, corners=(1.0,),
+                     current_area=True),
     "TransverselyIsotropic": good(direction=FIBRE, young=1.0, poisson=0.3, axial_young=1.0, axial_poisson=0.3,
                                   axial_shear=1.0),
     "TriangulatedTool": good(state="@state", facets="@facets", surface="@triangle", path="@path", contact="@contact",

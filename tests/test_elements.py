@@ -13,7 +13,7 @@ from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, begin
 from cutsim.base.assembly import integrate
 from cutsim.base.compat import form
-from cutsim.bodies.loads import Pressure, Support, Traction
+from cutsim.bodies.loads import NodalForce, Pressure, Support, Traction
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
@@ -253,6 +253,34 @@ def test_pressure_turns_and_grows_with_the_surface(gdim):
     load.evaluate()
     force = [load.record()[f"pressure_force_{c}"][0] for c in "xyz"[:gdim]]
     np.testing.assert_allclose(force, -3.0 * 1.4 * R[:, up], atol=1e-12)
+
+
+def test_traction_per_current_area():
+    """Resultant t a n of fixed direction, and its tangent."""
+    b = make_blocks(2)
+    load = Traction(b.state, b.face(1, 1.0), (0.5, 2.0), lambda t: 3.0, current_area=True)
+    R, stretch = rotation(2, 0.7), np.diag([1.4, 1.0])
+    b.move(*2 * [lambda x: (R @ stretch - np.eye(2)) @ x[:2]])
+    load.evaluate()
+    force = [load.record()[f"load_force_{c}"][0] for c in "xy"]
+    np.testing.assert_allclose(force, [3 * 1.4 * 0.5, 3 * 1.4 * 2.0], atol=1e-12)
+    assert_slope_two(load, b.state, 0.1 * smooth(b.state.V, 1, 1.0), 0.3)
+
+
+@pytest.mark.mpi
+def test_forces_on_vertices_of_a_bar():
+    """Half of the force on each corner of the only element across a bar is a uniform traction."""
+    pulled = []
+    for kind in ("traction", "forces"):
+        b = Body(rectangle([(0, 0), (4, 1)], (4, 1)), axisymmetric=False)
+        if kind == "traction":
+            load = Traction(b.state, b.where(at(0, 4)), (0.2, 0.1), lambda t: t)
+        else:
+            vertices = mesh.locate_entities(b.state.mesh, 0, at(0, 4))
+            load = NodalForce(b.state, vertices, (0.1, 0.05), lambda t: t, name="load")
+        supports = [b.hold(at(0, 0), i, name="xy"[i]) for i in range(2)]
+        pulled.append(final(Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), load], supports), step=0.5))
+    assert pulled[1] == pytest.approx(pulled[0], rel=1e-7, abs=1e-10)
 
 
 def ring(inner, outer, height, flux=None):

@@ -7,6 +7,7 @@ import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
+from petsc4py import PETSc
 
 from cutsim.base.assembly import global_dot, nodal_forces, resultant
 from cutsim.base.checks import count, require, require_number, require_numbers
@@ -136,45 +137,32 @@ def _opposite(value: float | TimeFunction) -> float | TimeFunction:
 
 
 class Load(Term, ABC):
-    """Base of loads on a part of the boundary, `_density` per reference area times a factor that varies in time."""
+    """Base of loads whose forces are proportional to a factor that varies in time."""
 
     def __init__(
-        self,
-        state: State,
-        facets: NDArray[np.int32],
-        factor: TimeFunction,
-        parameter: str,
-        name: str,
-        corners: tuple[float, ...],
+        self, state: State, factor: TimeFunction, parameter: str, name: str, corners: tuple[float, ...]
     ) -> None:
         require_numbers("corners", corners, least=0)
         self.name, self.state, self._corners = name, state, corners
         self._factor = Schedule(state.mesh, state.memory, factor, parameter, name)
-        self._ds = state.measures.exterior(facets)
-        self._scale = self._factor.constant
-        self._form = form(self.residual(ufl.TestFunction(state.V)))
         self._forces = state.memory.value(f"{name}: forces", np.zeros(len(state.increment)))
-
-    @abstractmethod
-    def _density(self) -> Expr:
-        """Force per reference area at factor 1, a vector [stress]."""
 
     @property
     def corners(self) -> tuple[float, ...]:
         """Times at which the factor has a kink."""
         return self._corners
 
-    def residual(self, v: Expr) -> ufl.Form:
-        """Minus the virtual work of the load."""
-        return -self._scale * ufl.dot(self._density(), v) * self._ds
-
     def begin(self) -> None:
         """Set the load to its value at the end of the step."""
         self._factor.begin(self.state.time)
 
+    @abstractmethod
+    def _nodal_forces(self) -> NDArray[np.float64]:
+        """Forces on the owned dofs in the trial state [force]. Collective."""
+
     def evaluate(self) -> None:
         """Nodal forces of the load. Collective."""
-        self._forces.trial = -nodal_forces(self._form)
+        self._forces.trial = self._nodal_forces()
 
     def external_work(self) -> float:
         """Work of the load in the step: mean force times displacement increment. Collective."""
@@ -194,8 +182,44 @@ class Load(Term, ABC):
         return {f"{self.name}_force_{'xyz'[i]}": (float(f), "force") for i, f in enumerate(total)}
 
 
-class Traction(Load):
-    """Dead traction on a part of the boundary.
+class SurfaceLoad(Load):
+    """Base of loads on a part of the boundary, `_density` per reference area times the factor."""
+
+    def __init__(
+        self,
+        state: State,
+        facets: NDArray[np.int32],
+        factor: TimeFunction,
+        parameter: str,
+        name: str,
+        corners: tuple[float, ...],
+    ) -> None:
+        super().__init__(state, factor, parameter, name, corners)
+        self._ds = state.measures.exterior(facets)
+        self._scale = self._factor.constant
+        self._form = form(self.residual(ufl.TestFunction(state.V)))
+
+    @abstractmethod
+    def _density(self) -> Expr:
+        """Force per reference area at factor 1, a vector [stress]."""
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """Minus the virtual work of the load."""
+        return -self._scale * ufl.dot(self._density(), v) * self._ds
+
+    def _nodal_forces(self) -> NDArray[np.float64]:
+        return -nodal_forces(self._form)
+
+    def _area_vector(self) -> Expr:
+        """Current area vector per reference area by Nanson's formula, cof(F) N, three components."""
+        gdim = self.state.mesh.geometry.dim
+        N = ufl.FacetNormal(self.state.mesh)
+        outward = ufl.as_vector([*(N[i] for i in range(gdim)), *[0] * (3 - gdim)])
+        return cofactor(self.state.deformation_gradient(self.state.u)) * outward
+
+
+class Traction(SurfaceLoad):
+    """Traction of fixed direction on a part of the boundary; a dead load unless it is per current area.
 
     Args:
         state: Displacement and time.
@@ -204,6 +228,8 @@ class Traction(Load):
         factor: Function of time that scales it.
         name: Name in messages and output.
         corners: Times at which the factor has a kink.
+        current_area: Whether it is a force per current area in place of one per reference area; in plane stress the
+            change of thickness is left out.
 
     Raises:
         ValueError: The direction has the wrong number of components.
@@ -219,17 +245,22 @@ class Traction(Load):
         *,
         name: str = "load",
         corners: tuple[float, ...] = (),
+        current_area: bool = False,
     ) -> None:
         gdim = state.mesh.geometry.dim
         require_numbers("direction", direction, length=gdim)
+        self._current_area, self.symmetric = current_area, not current_area
         self._direction = fem.Constant(state.mesh, np.array(direction, dtype=default_scalar_type))
         super().__init__(state, facets, factor, "factor", name, corners)
 
     def _density(self) -> Expr:
-        return self._direction
+        if not self._current_area:
+            return self._direction
+        area = self._area_vector()
+        return ufl.sqrt(ufl.dot(area, area)) * self._direction
 
 
-class Pressure(Load):
+class Pressure(SurfaceLoad):
     """Fluid pressure on a part of the boundary, along the current normal and per current area.
 
     Nanson's formula gives the force −p cof(F) N per reference area; in plane stress the change of thickness is left
@@ -261,8 +292,88 @@ class Pressure(Load):
         super().__init__(state, facets, pressure, "pressure", name, corners)
 
     def _density(self) -> Expr:
-        gdim = self.state.mesh.geometry.dim
-        N = ufl.FacetNormal(self.state.mesh)
-        outward = ufl.as_vector([*(N[i] for i in range(gdim)), *[0] * (3 - gdim)])
-        force = cofactor(self.state.deformation_gradient(self.state.u)) * outward
-        return -ufl.as_vector([force[i] for i in range(gdim)])
+        area = self._area_vector()
+        return -ufl.as_vector([area[i] for i in range(self.state.mesh.geometry.dim)])
+
+
+class NodalForce(Load):
+    """The same dead force on each of some vertices.
+
+    The deformation under a force at a point depends on the mesh.  Where the vertices are those of a surface, a
+    `Traction` is a load that does not.
+
+    Args:
+        state: Displacement and time.
+        vertices: Local vertices.
+        direction: Force on each of them at factor 1, one number a component [force].
+        factor: Function of time that scales it.
+        name: Name in messages and output.
+        corners: Times at which the factor has a kink.
+
+    Raises:
+        ValueError: The direction has the wrong number of components, or no vertex is found on any rank.
+    """
+
+    @checked
+    def __init__(
+        self,
+        state: State,
+        vertices: NDArray[np.int32],
+        direction: tuple[float, ...],
+        factor: TimeFunction,
+        *,
+        name: str = "force",
+        corners: tuple[float, ...] = (),
+    ) -> None:
+        gdim = state.mesh.geometry.dim
+        require_numbers("direction", direction, length=gdim)
+        super().__init__(state, factor, "factor", name, corners)
+        nodes = locate_dofs(state.V, 0, vertices)
+        nodes = nodes[nodes < state.V.dofmap.index_map.size_local]
+        found = state.mesh.comm.allreduce(len(nodes))
+        require("vertices", found, found > 0, f"vertices that carry dofs (load {name!r})")
+        self._dofs = (gdim * nodes[:, None] + np.arange(gdim, dtype=np.int32)).ravel()
+        self._unit = np.tile(np.array(direction, dtype=float), len(nodes))
+        self._forces_on_vertices = _DeadForces(self)
+
+    @property
+    def assemblers(self) -> Sequence["_DeadForces"]:
+        """The forces."""
+        return (self._forces_on_vertices,)
+
+    def residual(self, v: Expr) -> ufl.Form:
+        """No form: the forces are those of the assembler."""
+        return ufl.Form([])
+
+    def forces(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
+        """Owned dofs and the forces on them at the end of the step [force]."""
+        return self._dofs, self._factor.value * self._unit
+
+    def _nodal_forces(self) -> NDArray[np.float64]:
+        nodal = np.zeros(len(self.state.increment))
+        dofs, forces = self.forces()
+        nodal[dofs] = forces
+        return nodal
+
+
+class _DeadForces:
+    """The forces of a load on vertices, as `cutsim.base.terms.Assembler`; they have no tangent."""
+
+    pattern = 0
+
+    def __init__(self, load: NodalForce) -> None:
+        self._load = load
+
+    def prepare(self) -> None:
+        """Nothing depends on the displacement."""
+
+    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None) -> None:
+        """Subtract the forces, which are external, see `cutsim.base.terms.Assembler.add_forces`."""
+        dofs, forces = self._load.forces()
+        b.setValues((b.getOwnershipRange()[0] + dofs).astype(PETSc.IntType), -forces, addv=PETSc.InsertMode.ADD)
+
+    def add_tangent(self, A: PETSc.Mat) -> None:
+        """Nothing."""
+
+    def add_pattern(self, A: PETSc.Mat) -> None:
+        """Nothing."""
