@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from cutsim.cases.geometries import LAMINATE
+from cutsim.cases.keys import Keys
 from cutsim.cases.schema_parts import Tool
-from cutsim.cases.scope import Keys
 
 #: Where something is wrong, what, and the value.
 Problem = tuple[Keys, str, Any]

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from cutsim.cases.scope import SINGULAR, Keys, full
+from cutsim.cases.keys import SINGULAR, Keys, dotted, full
 
 #: Keys that say what a table describes: with another value it is another table, not a change of the first.
 _KINDS = ("model", "library", "shape", "kind", "geometry", "file", "fixed")
@@ -120,11 +120,6 @@ class Document:
         return Document(_merged(self.tables, other.tables), {**self.origins, **other.origins})
 
 
-def dotted(keys: Keys) -> str:
-    """Keys as one key with dots."""
-    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).removeprefix(".")
-
-
 def _short(value: Any) -> str:
     if isinstance(value, Mapping):
         text = f"{{{', '.join(map(str, value))}}}"
@@ -142,7 +137,12 @@ def _paths(value: Any, keys: Keys = ()) -> Iterator[Keys]:
 
 
 def _merged(first: Any, second: Any) -> Any:
-    """Two tables as one, in which the second wins; a table of another kind replaces the first."""
+    """Two tables as one, in which the second wins; a table of another kind replaces the first.
+
+    A table with numbers for keys changes entries of a list.
+    """
+    if isinstance(first, list) and isinstance(second, Mapping) and second.keys() <= set(range(len(first))):
+        return [_merged(entry, second[i]) if i in second else entry for i, entry in enumerate(first)]
     if not isinstance(first, Mapping) or not isinstance(second, Mapping):
         return second
     if any(key in second and first.get(key) != second[key] for key in _KINDS):
@@ -251,5 +251,5 @@ def setting(key: str, text: str) -> Document:
         tables = tomllib.loads(f"value = {text}")
         value = tables["value"] if len(tables) == 1 else text
     for part in reversed(key.split(".")):
-        value = {part: value}
+        value = {int(part) if part.isdecimal() else part: value}
     return unfolded(value, Setting(f"{key}={text}"))

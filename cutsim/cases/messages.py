@@ -8,12 +8,14 @@ from pydantic_core import ErrorDetails
 
 from cutsim.base.checks import Refused
 from cutsim.cases.document import Document
-from cutsim.cases.scope import Keys, Scope, nearest
+from cutsim.cases.keys import Keys, nearest
+from cutsim.cases.scope import Scope
 from cutsim.cases.tables import arguments_of
 
 _KINDS = ("model", "shape", "kind")
 _FORMS = {"<single>": "a text or a number", "<list>": "a list in brackets", "<table>": "a table"}
 _WORDS = {
+    "path_type": "must be a text in quotes",
     "string_type": "must be a text in quotes",
     "bool_type": "must be true or false",
     "tuple_type": "must be a list in brackets",
@@ -68,8 +70,8 @@ def _keys(location: tuple[int | str, ...], tables: Any) -> tuple[Keys, Any]:
 def refusal(refused: Refused, keys: Keys, node: Any, document: Document) -> str:
     """What a constructor refuses, at the key that has the name of the parameter."""
     name, value = refused.name, refused.value
-    if name.isidentifier():
-        keys = (*keys, name)
+    if name.replace(".", "").isidentifier():
+        keys = (*keys, *name.split("."))
         value = node.get(name, value) if isinstance(node, Mapping) else value
         return document.problem(keys, f"must be {refused.allowed}", value)
     return document.problem(keys, f"{name} = {value!r} must be {refused.allowed}")
@@ -80,7 +82,7 @@ def _about_key(keys: Keys, tables: Any, scope: Scope) -> str:
     parent: Any = tables
     for key in keys[:-1]:
         parent = parent[key]
-    table, name = scope.tables.get(id(parent)), str(keys[-1])
+    table, name = scope.known.get(id(parent)), str(keys[-1])
     if table is None:
         return f"must have {len(parent) + 1} entries or more" if isinstance(parent, list) else "is not allowed here"
     if name in table.model_fields:

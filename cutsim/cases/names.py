@@ -1,8 +1,9 @@
 """Names in case files that refer to groups of the mesh and to other tables, each checked with its nearest spelling."""
 
+from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator
+from pydantic import AfterValidator, BeforeValidator
 from pydantic_core import CoreSchema, core_schema
 
 
@@ -10,7 +11,7 @@ class Known:
     """Annotation of a name that has to be known.
 
     Args:
-        kind: What it names: "groups", "surfaces", or a table of the file such as "bodies".
+        kind: What it names, as `cutsim.cases.scope.Scope.names` knows it.
     """
 
     def __init__(self, kind: str) -> None:
@@ -33,6 +34,9 @@ def _several(value: Any) -> Any:
 
 _SEVERAL = BeforeValidator(_several, json_schema_input_type=str | list[str])
 
+#: A built-in geometry, and a parameter of it.
+Geometry = Annotated[str, Known("geometries")]
+GeometryParameter = Annotated[str, Known("parameters of the geometry")]
 #: A group of cells or facets of the mesh.
 Group = Annotated[str, Known("groups")]
 #: One group or several.
@@ -43,3 +47,13 @@ BodyName = Annotated[str, Known("bodies")]
 CrackName = Annotated[str, Known("cracks")]
 PairName = Annotated[str, Known("pairs")]
 ToolName = Annotated[str, Known("tools")]
+
+
+def _existing(path: Path) -> Path:
+    if not path.is_file():
+        raise ValueError("must be a file: there is none of this name")
+    return path
+
+
+#: A file, relative to the case file that names it.
+ExistingFile = Annotated[Path, AfterValidator(_existing)]

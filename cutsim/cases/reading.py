@@ -1,6 +1,6 @@
 """Reading of case files: all that is wrong is found before anything is meshed or compiled."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -36,13 +36,17 @@ def read_case(path: Path | str, changes: Mapping[str, str] | None = None) -> Cas
     return checked_case(document)
 
 
-def checked_case(document: Document) -> Case:
+def checked_case(document: Document, groups: Collection[str] | None = None) -> Case:
     """The case of a document.
+
+    Args:
+        document: The document.
+        groups: Names of the groups of its mesh, if that has been read.
 
     Raises:
         CaseError: Something is wrong in it.
     """
-    scope = _scope(document)
+    scope = _scope(document, groups)
     case, found = None, list[str]()
     try:
         case = Case.model_validate(document.tables, context=scope)
@@ -58,10 +62,10 @@ def checked_case(document: Document) -> Case:
 _UNITS: TypeAdapter[Units] = TypeAdapter(Annotated[Units, FromTable()])
 
 
-def _scope(document: Document) -> Scope:
+def _scope(document: Document, groups: Collection[str] | None) -> Scope:
     """Scope of the values of a document; with the usual units if its own are not valid, which is found later."""
     try:
         units = consistent(_UNITS.validate_python(document.tables.get("units", {}), context=Scope({}, Units())))
     except ValueError:
         units = Units()
-    return Scope(document.tables, units)
+    return Scope(document.tables, units, groups)

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator
 
 from cutsim.base.units import Units
+from cutsim.cases.expressions import RESERVED
 from cutsim.cases.quantities import consistent
 from cutsim.cases.schema_heat import Heat
 from cutsim.cases.schema_materials import AnyMaterial, Law
@@ -17,6 +18,15 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.materials.elastic import Material
 
 Named = Annotated[str, Field(pattern=r"^\w[\w -]*$")]
+
+
+def _parameter(name: str) -> str:
+    if not name.isidentifier() or name in RESERVED:
+        raise ValueError(f"must be a name of letters, digits and _, and none of {', '.join(sorted(RESERVED))}")
+    return name
+
+
+Parameter = Annotated[str, AfterValidator(_parameter)]
 
 
 class Header(Table):
@@ -32,7 +42,7 @@ class Header(Table):
     title: str = ""
     extends: str | None = None
     units: Annotated[Units, FromTable(), AfterValidator(consistent)] = Units()
-    parameters: dict[str, Free] = Field(default_factory=dict)
+    parameters: dict[Parameter, Free] = Field(default_factory=dict)
 
 
 class Parts(Table):

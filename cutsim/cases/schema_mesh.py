@@ -2,9 +2,11 @@
 
 from typing import Literal
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 
+from cutsim.base.checks import require
 from cutsim.base.units import Number
+from cutsim.cases.names import ExistingFile, Geometry, GeometryParameter
 from cutsim.cases.tables import Flag, Free, Table
 
 
@@ -21,18 +23,17 @@ class Mesh(Table):
         axisymmetric: Whether the mesh is the meridian plane of a body of revolution about x = 0.
     """
 
-    geometry: str | None = None
-    set: dict[str, Free] = Field(default_factory=dict)
-    file: str | None = None
+    geometry: Geometry | None = None
+    set: dict[GeometryParameter, Free] = Field(default_factory=dict)
+    file: ExistingFile | None = None
     scale: Number = 1.0
     dim: Literal[2, 3] | None = None
     degree: Literal[1, 2] = 1
     axisymmetric: Flag = False
 
     @model_validator(mode="after")
-    def _one_source(self, info: ValidationInfo) -> "Mesh":
+    def _one_source(self) -> "Mesh":
         if (self.geometry is None) == (self.file is None):
-            raise ValueError("must have either a geometry or a file")
-        if self.file is not None and self.set:
-            raise ValueError("must not have parameters (set) beside a file: they are those of a geometry")
+            raise ValueError("must have either geometry or file")
+        require("set", list(self.set), self.file is None or not self.set, "left out beside a file")
         return self

@@ -6,7 +6,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, Viscosity
 from cutsim.cases.expressions import TimeValue
-from cutsim.cases.names import Group, Groups, Surfaces
+from cutsim.cases.names import ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
 from cutsim.cases.tables import FORM, Constructed, Flag, FromTable, Table, Varying, With
 from cutsim.materials.thermoelastic import ThermoElastic
@@ -167,7 +167,7 @@ def _motion(value: Any) -> str:
     )
 
 
-Path = Annotated[Annotated[Polyline, Tag("<points>")] | Annotated[Saw, Tag("<saw>")], Discriminator(_motion)]
+Motion = Annotated[Annotated[Polyline, Tag("<points>")] | Annotated[Saw, Tag("<saw>")], Discriminator(_motion)]
 
 
 class Tool(Constructed):
@@ -186,7 +186,7 @@ class Tool(Constructed):
     friction: Friction = 0.0
     surfaces: Surfaces = ()
     position: tuple[Displacement, ...] | None = None
-    path: Path | None = None
+    path: Motion | None = None
     corners: tuple[Time, ...] = ()
     contact: Contact | None = None
 
@@ -206,7 +206,7 @@ class SurfaceTool(Tool):
     """
 
     shape: Literal["surface"]
-    file: str
+    file: ExistingFile
     scale: Number = 1.0
     search: Length | None = None
 

@@ -35,7 +35,7 @@ import cutsim
 from cutsim.base.checks import Refused
 from cutsim.base.units import Kind, Number
 from cutsim.bodies.schemes import Scheme
-from cutsim.cases.scope import nearest
+from cutsim.cases.keys import nearest
 from cutsim.heat.contact_heat import HeatLaw
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.friction import FrictionLaw
@@ -66,7 +66,7 @@ class Table(BaseModel):
     def _remember(cls, value: Any, info: ValidationInfo) -> Any:
         """Keep in mind which keys a table may have, for messages."""
         if info.context is not None:
-            info.context.tables[id(value)] = cls
+            info.context.known[id(value)] = cls
         return value
 
 
