@@ -6,6 +6,6 @@ tables there are.
 
 from cutsim.cases.case import Case
 from cutsim.cases.document import CaseError
-from cutsim.cases.reading import read_case
+from cutsim.cases.reading import check_groups, read_case
 
-__all__ = ["Case", "CaseError", "read_case"]
+__all__ = ["Case", "CaseError", "check_groups", "read_case"]

@@ -13,6 +13,11 @@ class Case(CaseTables):
     _document: Document = PrivateAttr(default_factory=Document)
 
     @property
+    def document(self) -> Document:
+        """What was read."""
+        return self._document
+
+    @property
     def text(self) -> str:
         """The case as one file: with what it extends, and with all changes."""
         tables = {key: value for key, value in self._document.tables.items() if key != "extends"}

@@ -33,19 +33,23 @@ def read_case(path: Path | str, changes: Mapping[str, str] | None = None) -> Cas
     document = load(Path(path))
     for key, text in (changes or {}).items():
         document = document.changed(setting(key, text))
-    return checked_case(document)
+    return _checked(document)
 
 
-def checked_case(document: Document, groups: Collection[str] | None = None) -> Case:
-    """The case of a document.
+def check_groups(case: Case, groups: Collection[str]) -> None:
+    """Refuse a case whose mesh has other groups than it names.
 
     Args:
-        document: The document.
-        groups: Names of the groups of its mesh, if that has been read.
+        case: The case.
+        groups: Names of all groups of its mesh, which has been read.
 
     Raises:
-        CaseError: Something is wrong in it.
+        CaseError: As `read_case`, with the nearest spelling for each group that the mesh does not have.
     """
+    _checked(case.document, groups)
+
+
+def _checked(document: Document, groups: Collection[str] | None = None) -> Case:
     scope = _scope(document, groups)
     case, found = None, list[str]()
     try:
