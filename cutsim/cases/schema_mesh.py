@@ -17,6 +17,7 @@ class Mesh(Table):
         geometry: Name of a built-in geometry; "laminate" is a block of the layers in ``[[layers]]``.
         set: Parameters of the geometry.
         file: File with a mesh and its groups, relative to the case file.
+        only: Groups of cells of the file that make the mesh; by default all its cells.
         scale: Length in the units of the case of one unit of the file.
         dim: Dimension of the mesh and of its space; by default that of the geometry, or 3 for a file.
         degree: Degree of the displacement.
@@ -26,6 +27,7 @@ class Mesh(Table):
     geometry: Geometry | None = None
     set: dict[GeometryParameter, Free] = Field(default_factory=dict)
     file: ExistingFile | None = None
+    only: tuple[str, ...] = ()
     scale: Number = 1.0
     dim: Literal[2, 3] | None = None
     degree: Literal[1, 2] = 1
@@ -35,5 +37,6 @@ class Mesh(Table):
     def _one_source(self) -> "Mesh":
         if (self.geometry is None) == (self.file is None):
             raise ValueError("must have either geometry or file")
+        require("only", list(self.only), self.geometry is None or not self.only, "left out beside a geometry")
         require("set", list(self.set), self.file is None or not self.set, "left out beside a file")
         return self

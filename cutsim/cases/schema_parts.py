@@ -227,6 +227,7 @@ class Support(Table):
     Args:
         facets: Groups of facets that it holds.
         cells: Groups of cells that it holds.
+        vertices: Groups of vertices that it holds.
         points: Points of which it holds the nearest vertices [length].
         direction: Along which the displacement is prescribed: "x", "y", "z", a vector, or "all" for each component.
         value: Displacement [length].
@@ -235,6 +236,7 @@ class Support(Table):
 
     facets: Groups = ()
     cells: Groups = ()
+    vertices: Groups = ()
     points: tuple[tuple[Length, ...], ...] = ()
     direction: AnyDirection
     value: Displacement = 0.0
@@ -242,8 +244,8 @@ class Support(Table):
 
     @model_validator(mode="after")
     def _one_place(self) -> "Support":
-        if sum(map(bool, (self.facets, self.cells, self.points))) != 1:
-            raise ValueError("must have one of facets, cells and points")
+        if sum(map(bool, (self.facets, self.cells, self.vertices, self.points))) != 1:
+            raise ValueError("must have one of facets, cells, vertices and points")
         return self
 
 
@@ -263,13 +265,14 @@ class Pressure(Table):
 
 
 class Traction(Table):
-    """Dead traction on a part of the boundary.
+    """Traction of fixed direction on a part of the boundary.
 
     Args:
         facets: Groups of facets.
         direction: Direction of the traction: "x", "y", "z", or a vector, whose length does not matter.
         value: Force per reference area along the direction [stress].
         corners: Times at which it has a kink; those of a table are known [time].
+        current_area: Whether it is a force per current area instead.
     """
 
     kind: Literal["traction"]
@@ -277,6 +280,32 @@ class Traction(Table):
     direction: Direction
     value: Annotated[TimeValue, Varying("stress")]
     corners: tuple[Time, ...] = ()
+    current_area: Flag = False
 
 
-Load = Annotated[Pressure | Traction, Field(discriminator="kind")]
+class NodalForce(Table):
+    """The same force on each of some vertices.
+
+    Args:
+        vertices: Groups of vertices.
+        points: Points of which the nearest vertices are loaded [length].
+        direction: Direction of the force: "x", "y", "z", or a vector, whose length does not matter.
+        value: Force on each vertex along the direction [force].
+        corners: Times at which it has a kink; those of a table are known [time].
+    """
+
+    kind: Literal["force"]
+    vertices: Groups = ()
+    points: tuple[tuple[Length, ...], ...] = ()
+    direction: Direction
+    value: Annotated[TimeValue, Varying("force")]
+    corners: tuple[Time, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_place(self) -> "NodalForce":
+        if bool(self.vertices) == bool(self.points):
+            raise ValueError("must have either vertices or points")
+        return self
+
+
+Load = Annotated[Pressure | Traction | NodalForce, Field(discriminator="kind")]
