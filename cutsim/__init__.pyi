@@ -61,6 +61,8 @@ from .materials.rubbers import Yeoh as Yeoh
 from .materials.thermoelastic import ThermoElastic as ThermoElastic
 from .materials.viscoelastic import Prony as Prony
 from .pairs.surface_pair import SurfacePair as SurfacePair
+from .results.checkpoint_file import CheckpointError as CheckpointError
+from .results.checkpoints import Checkpoints as Checkpoints
 from .results.output import read_history as read_history
 from .results.pictures import draw_body as draw_body
 from .results.pictures import draw_stress as draw_stress

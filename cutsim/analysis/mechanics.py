@@ -122,9 +122,9 @@ class Mechanics(Balance[Term, Support]):
         self._apart = unjoined(state.mesh, [t.facets for t in offering(terms, Joining)])
         if self._apart:
             state.verdict.doubt("mesh", f"mesh: {self._apart}")
-        audit = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0))
+        audit, rest = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0)), 0 * state.increment
         self._audit = state.memory.value("mechanics: audit", audit)
-        self._rate_forces = state.memory.value("mechanics: rate forces", np.zeros(len(state.increment)))
+        self._rate_forces = state.memory.value("mechanics: rate forces", rest, places=self._residual.places)
         self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
     @property

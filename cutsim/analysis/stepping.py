@@ -20,7 +20,7 @@ from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.base.units import Time
-from cutsim.fields.state import State
+from cutsim.fields.state import Pace, State
 from cutsim.solvers.iterations import LINE_SEARCHES, Outcome
 
 logger = collective_logger(__name__)
@@ -31,6 +31,8 @@ _SLIVER = 0.1
 _STRAYED = 1e-3
 # corners that differ by less than this fraction of the smallest step are one
 _ROUNDING = 1e-6
+# what the verdict says of a run that has not come to its end, until it goes on
+_ENDS = ("interrupted", "ended")
 
 
 class Audit(Protocol):
@@ -294,8 +296,10 @@ def run(
     require_number("until", until, above(state.time_old, "the present time").or_inf)
     problem.check()
     corners, report = [c for c in (*problem.corners, until) if c <= until], None
-    if state.pace.committed is None or state.pace.committed.control != control:
-        state.pace.set(Pace(control, control.first))
+    if state.pace.committed.control != repr(control):
+        state.pace.set(Pace(repr(control), control.first))
+    for end in _ENDS:
+        state.verdict.withdraw(end)
     with _interruptible(state.mesh.comm) as interrupted:
         while ahead := [c for c in corners if c > state.time_old + _ROUNDING * control.smallest]:
             report = _advance(problem, control, min(ahead))
@@ -304,7 +308,7 @@ def run(
             if report.interrupted:
                 words = f"interrupted at time {report.time:.6g} of {until:.6g}"
                 if report.time < until:
-                    state.verdict.doubt("interrupted", words)
+                    state.verdict.suppose("interrupted", words, aloud=True)
                 if interrupt == "raise":
                     raise Interrupted(words, report)
                 break
@@ -314,25 +318,10 @@ def run(
     return report
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Step control in use and size of the next step.
-
-    Attributes:
-        control: The control that has chosen its size.
-        size: Its size [time].
-        smooth: Whether the last step tells where it leads.
-    """
-
-    control: Control
-    size: float
-    smooth: bool = False
-
-
 def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
     """One accepted step that does not pass the corner; its first try may be predicted."""
     state, cuts = problem.state, 0
-    pace: Pace = state.pace.committed
+    pace = state.pace.committed
     size = pace.size
     while True:
         start = state.time_old
@@ -355,7 +344,7 @@ def _accept(problem: Problem, control: Control, report: StepReport, size: float)
         state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
     problem.watch()
     following = control.next(replace(report, dt=size))
-    state.pace.trial = Pace(control, following, smooth=not report.corner and not report.cuts)
+    state.pace.trial = Pace(repr(control), following, smooth=not report.corner and not report.cuts)
     state.commit()
     return replace(report, columns=problem.record())
 
@@ -363,7 +352,7 @@ def _accept(problem: Problem, control: Control, report: StepReport, size: float)
 def _no_step(problem: Problem, control: Control, report: StepReport) -> StepError:
     """The end of a run in which no step succeeds."""
     start, advice = problem.state.time_old, problem.advise()
-    problem.state.verdict.doubt("ended", f"no step succeeds from time {start:.6g} on")
+    problem.state.verdict.suppose("ended", f"no step succeeds from time {start:.6g} on", aloud=True)
     return StepError(
         f"no step from time {start:.6g} of {report.dt:.3g} or more succeeds "
         f"(smallest = {control.smallest:.3g}): {report.refusal}" + (f". {advice}" if advice else "")

@@ -8,6 +8,7 @@ from dolfinx import default_scalar_type, fem
 from cutsim.base.assembly import Array, integrate, nodal_forces
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr, green_lagrange
+from cutsim.base.places import Places
 from cutsim.bodies.formulations import Formulation
 from cutsim.fields.state import State
 
@@ -113,7 +114,8 @@ class Heating(Contribution):
         self._form = form(self._brought())
         memory = formulation.elasticity.state.memory
         self._energy = memory.value(f"{name}: thermal work", -integrate(self._form))
-        self._seen = memory.value(f"{name}: temperature", temperature.value.x.array.copy(), self._show)
+        seen, places = temperature.value.x.array.copy(), Places.of(temperature.space)
+        self._seen = memory.value(f"{name}: temperature", seen, self._show, places=places)
         self._show(self._seen.committed)
 
     def _show(self, seen: Array) -> None:

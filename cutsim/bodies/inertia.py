@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from cutsim.base.assembly import Array, global_dot
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.base.places import Places
 from cutsim.base.terms import Body, Term
 from cutsim.bodies.mass import Mass
 from cutsim.bodies.schemes import Scheme
@@ -81,7 +82,9 @@ class Inertia(Term):
         self._predicted = fem.Function(state.V)
         # c/(β Δt²); zero until the first step begins
         self._weight = fem.Constant(state.mesh, default_scalar_type(0.0))
-        self._known = state.memory.value("inertia", _Known(np.zeros(len(state.increment))))
+        self._known = state.memory.value(
+            "inertia", _Known(np.zeros(len(state.increment))), places=Places.owned(state.V)
+        )
 
     # -- start ----------------------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from cutsim.base.checks import count, require, require_number, require_numbers
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr, cofactor
 from cutsim.base.parameters import Schedule, TimeFunction
+from cutsim.base.places import Places
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns, Term
 from cutsim.fields.space import locate_dofs
@@ -145,7 +146,8 @@ class Load(Term, ABC):
         require_numbers("corners", corners, least=0)
         self.name, self.state, self._corners = name, state, corners
         self._factor = Schedule(state.mesh, state.memory, factor, parameter, name)
-        self._forces = state.memory.value(f"{name}: forces", np.zeros(len(state.increment)))
+        rest, places = np.zeros(len(state.increment)), Places.owned(state.V)
+        self._forces = state.memory.value(f"{name}: forces", rest, places=places)
 
     @property
     def corners(self) -> tuple[float, ...]:

@@ -61,7 +61,7 @@ class Maxwell:
         self._integral = form(self._density * measure)
         rest = np.zeros((len(strengths), *strain.shape))
         relaxed = np.stack([spring.reduced(strain)] * len(strengths))
-        self._terms = memory.value(name, _Terms(rest, relaxed, rest))
+        self._terms = memory.value(name, _Terms(rest, relaxed, rest), places=spring.points.places(axis=1))
 
     @property
     def stored(self) -> float:

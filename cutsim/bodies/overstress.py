@@ -47,7 +47,9 @@ class Overstress(Contribution):
         strain, stress = self._evaluate()
         memory = self._state.memory
         # stress of the energy, and overstress of each term
-        self._stresses = memory.value(f"{name}: overstress", (stress, np.zeros((len(prony.times), *stress.shape))))
+        start = stress, np.zeros((len(prony.times), *stress.shape))
+        places = self._points.places(), self._points.places(axis=1)
+        self._stresses = memory.value(f"{name}: overstress", start, places=places)
         # in a step the overstress is known + weight × stress
         self._known = TensorField(f"{name}: known overstress", memory, self._points)
         self._weight = fem.Constant(mesh, default_scalar_type(0.0))

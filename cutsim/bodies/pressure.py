@@ -17,6 +17,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.kinematics import Expr, green_lagrange, small_strain
+from cutsim.base.places import Places
 from cutsim.bodies.elasticity import Law
 from cutsim.fields.space import vertex_space
 from cutsim.fields.state import State
@@ -54,7 +55,8 @@ class PressureField:
         self._law = law
         space = vertex_space(state.V, cells)
         self.unknown = fem.Function(space, name="pressure")
-        state.memory.array("pressure", self.unknown)
+        inside = None if cells is None else (lambda: (cells, space.dofmap.list[cells]))
+        state.memory.array("pressure", self.unknown, places=Places.of(space, inside))
         unit = fem.Constant(state.mesh, default_scalar_type(material.young / _mesh_size(state)))
         self.value = unit * self.unknown
         inside = fem.Function(fem.functionspace(state.mesh, ("DG", 0)))

@@ -14,6 +14,7 @@ from cutsim.base.assembly import Array
 from cutsim.base.compat import evaluate, expression
 from cutsim.base.kinematics import Expr
 from cutsim.base.memory import Memory
+from cutsim.base.places import Places
 
 
 class TensorPoints:
@@ -47,8 +48,16 @@ class TensorPoints:
     @cached_property
     def dofs(self) -> NDArray[np.int32]:
         """Local dof of each point of each cell, in a space of any number of components."""
-        dofs: NDArray[np.int32] = self.space().dofmap.list[self.cells]
+        dofs: NDArray[np.int32] = self._scalar.dofmap.list[self.cells]
         return dofs
+
+    def places(self, axis: int = 0) -> Places:
+        """Places of arrays of components whose cells are counted by an axis, and their points by the next one."""
+        return Places(self._scalar, self.dofs, axis)
+
+    @cached_property
+    def _scalar(self) -> fem.FunctionSpace:
+        return self.space()
 
     def space(self, *shape: int) -> fem.FunctionSpace:
         """Space of functions with values of a shape at the points."""

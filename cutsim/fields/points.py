@@ -1,7 +1,8 @@
 """Integration points on facets: history variables, evaluation of expressions, and sums."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import basix.ufl
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.compat import EntityMaps, create_submesh, form
 from cutsim.base.kinematics import Expr
+from cutsim.base.places import Places, corners, facet_order
 from cutsim.base.signatures import checked
 from cutsim.fields.state import State
 
@@ -35,6 +37,8 @@ class FacetPoints:
         measure: Measure over them, interior if `interior`.
         interior: Whether the facets have a cell on either side.
         degree: Degree of the quadrature.
+        ordered: Whether values are stored for the points of a facet in an order that does not depend on the ranks,
+            as who computes them has it; else in that of the quadrature, in which forms see them.
 
     Attributes:
         comm: Communicator of the mesh.
@@ -46,13 +50,20 @@ class FacetPoints:
     """
 
     def __init__(
-        self, mesh: Mesh, facets: NDArray[np.int32], measure: ufl.Measure, *, interior: bool, degree: int = DEGREE
+        self,
+        mesh: Mesh,
+        facets: NDArray[np.int32],
+        measure: ufl.Measure,
+        *,
+        interior: bool,
+        degree: int = DEGREE,
+        ordered: bool = False,
     ) -> None:
         fdim = mesh.topology.dim - 1
         # that of the submesh, which dies with the points, would do: but mpi4py keeps a lock with each communicator that
         # Python objects went through, and freeing it while an exception is under way blocks all that come after
         self.comm = mesh.comm
-        self._interior, self.degree = interior, degree
+        self._interior, self.degree, self._ordered = interior, degree, ordered
         self.measure = measure(metadata={"quadrature_degree": degree, "quadrature_scheme": "default"})
         unique = np.unique(np.asarray(facets, dtype=np.int32))
         self.submesh, self.facets, self._entity_map = create_submesh(mesh, fdim, unique)
@@ -67,6 +78,31 @@ class FacetPoints:
     def function(self, components: int = 1) -> fem.Function:
         """A function with a value, or a vector of values, at each point."""
         return fem.Function(self._space(components))
+
+    @cached_property
+    def places(self) -> Places:
+        """Places of arrays of point values."""
+        space = self._space(1)
+        return Places(space, space.dofmap.list, cells=self._dofs)
+
+    @property
+    def flat_places(self) -> Places:
+        """Places of arrays of point values that are flattened over the facets."""
+        return replace(self.places, dofs=self.places.dofs.ravel())
+
+    @property
+    def function_places(self) -> Places:
+        """Places of the values of a function made by `function`."""
+        return replace(self.places, dofs=np.arange(self.weights.size))
+
+    def _dofs(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """The facets, and the dofs of their points in an order that does not depend on the ranks. Collective."""
+        dofs = self.places.dofs
+        facets = np.arange(len(dofs), dtype=np.int32)
+        if not self._ordered:
+            x = self.evaluator({"x": self.at(ufl.SpatialCoordinate(self.measure.ufl_domain()))})()["x"]
+            dofs = np.take_along_axis(dofs, facet_order(x, corners(self.submesh, facets)[1]), axis=1)
+        return facets, np.asarray(dofs)
 
     def at(self, f: fem.Function) -> Expr:
         """A function of the points as it enters a form over them."""

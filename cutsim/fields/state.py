@@ -1,7 +1,6 @@
 """State of a run: displacement, time and all else that is remembered, trial and committed."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import ufl
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 from cutsim.base import kinematics
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
-from cutsim.base.memory import Memory, Remembered
+from cutsim.base.memory import Memory
+from cutsim.base.places import Places
 from cutsim.base.signatures import checked
 from cutsim.base.verdict import Verdict
 from cutsim.fields.cells import check_cells
@@ -35,6 +35,21 @@ class Clock:
     dt: float
     rate: NDArray[np.float64]
     number: int = 0
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Pace of a run: its step control and the size of the next step.
+
+    Attributes:
+        control: The control that has chosen the size, in words.
+        size: The size [time].
+        smooth: Whether the last step tells where the next one leads.
+    """
+
+    control: str = ""
+    size: float = 0.0
+    smooth: bool = False
 
 
 class State:
@@ -76,8 +91,8 @@ class State:
         self.verdict = Verdict(self.memory)
         self.memory.array("displacement", self.u, self.u_old)
         start = Clock(0.0, float(self.dt.value), np.zeros_like(self.u.x.array))
-        self._clock = self.memory.value("clock", start, self._show)
-        self.pace: Remembered[Any] = self.memory.value("pace", None)
+        self._clock = self.memory.value("clock", start, self._show, places=Places.of(V))
+        self.pace = self.memory.value("pace", Pace())
 
     def _show(self, clock: Clock) -> None:
         self.dt.value = clock.dt

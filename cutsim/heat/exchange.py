@@ -66,7 +66,8 @@ class HeatExchange:
         fields = {"flux_plus": q_plus, "flux_minus": q_minus, "temperature": mixed}
         self._evaluate = points.evaluator(fields | {"temperature_plus": plus, "temperature_minus": minus})
         self._friction = self._fracture = np.zeros_like(points.weights)
-        self._now = temperature.state.memory.value(f"{name}: heat", self._start(), self._show)
+        memory = temperature.state.memory
+        self._now = memory.value(f"{name}: heat", self._start(), self._show, places=points.places)
         self._show(self._now.committed)
 
     def _start(self) -> _Exchanged:

@@ -84,8 +84,8 @@ class InterfaceHistory:
         zero = np.zeros_like(points.weights)
         secants = np.zeros((*zero.shape, 2)) if law is None else np.stack(law.secants(zero, zero), axis=-1)
         start = _Known(dict.fromkeys((*_COLUMNS, *also), zero), secants, lost=zero, contact=zero)
-        self._known = memory.value(f"{name}: points", start, self._show)
-        memory.array(f"{name}: multiplier", self.multiplier)
+        self._known = memory.value(f"{name}: points", start, self._show, places=points.places)
+        memory.array(f"{name}: multiplier", self.multiplier, places=points.function_places)
         self._show(start)
 
     def _show(self, committed: _Known) -> None:

@@ -138,7 +138,9 @@ class SlipHistory:
         none = np.zeros_like(points.weights)
         flat = dict.fromkeys(("advance", "limit", "pressure", "level", "dissipated", "held"), none)
         values = {**start, **flat, "traction": np.zeros_like(start["traction"])}
-        self._known = state.memory.value(f"{name}: slip", values, lambda known: self._start_from(known["traction"]))
+        self._known = state.memory.value(
+            f"{name}: slip", values, lambda known: self._start_from(known["traction"]), places=points.places
+        )
         self._start_from(values["traction"])
 
     def evaluate(self) -> None:

@@ -10,6 +10,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.fields.points import FacetPoints
 from cutsim.fields.sizes import incidence
 from cutsim.pairs.overlap import inside_body
 from cutsim.pairs.pairing import Array, FacetShape, Indices
@@ -65,6 +66,22 @@ class OuterSurface:
     def total(self, count: int) -> int:
         """Sum of one number a rank. Collective."""
         return int(self.V.mesh.comm.allreduce(count, op=MPI.SUM))
+
+
+class SlaveSurface(OuterSurface):
+    """Outer surface with integration points, whose partners on a master surface are looked for.
+
+    Args:
+        V: As of `OuterSurface`.
+        points: Integration points of the facets.
+
+    Attributes:
+        places: Places of the points, flattened over the facets.
+    """
+
+    def __init__(self, V: fem.FunctionSpace, points: FacetPoints) -> None:
+        super().__init__(V, points.facets)
+        self.places = points.flat_places
 
 
 class Master(Protocol):

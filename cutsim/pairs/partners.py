@@ -6,7 +6,7 @@ import numpy as np
 from cutsim.base.memory import Memory
 from cutsim.fields.points import DEGREE
 from cutsim.pairs.configuration import Pairs, Points
-from cutsim.pairs.outer_surface import Master, OuterSurface
+from cutsim.pairs.outer_surface import Master, SlaveSurface
 from cutsim.pairs.pairing import Array, Hits, Indices
 from cutsim.pairs.search import PartnerSearch
 
@@ -45,7 +45,7 @@ class PairKinematics:
         self,
         memory: Memory,
         name: str,
-        slave: OuterSurface,
+        slave: SlaveSurface,
         master: Master,
         *,
         small_sliding: bool,
@@ -61,7 +61,8 @@ class PairKinematics:
         points = self._points(nodes[0])
         self._old, self._old_nodes = points, nodes
         count = len(self.tables[0])
-        self._slid = memory.value(f"{name}: slide", np.zeros((len(points.x), points.x.shape[-1] - 1)))
+        rest = np.zeros((len(points.x), points.x.shape[-1] - 1))
+        self._slid = memory.value(f"{name}: slide", rest, places=slave.places)
         self.partners = PartnerSearch(memory, name, slave, master, points, count, search=search, size=size)
         self._old_hits = self.partners.begin(points, nodes) if small_sliding else self.partners.dig_out()
         self._offset = np.zeros_like(points.x)

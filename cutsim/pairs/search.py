@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from cutsim.base.assembly import box
 from cutsim.base.memory import Memory
 from cutsim.pairs.configuration import Points
-from cutsim.pairs.outer_surface import Master, OuterSurface, normals
+from cutsim.pairs.outer_surface import Master, SlaveSurface, normals
 from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, project
 
 #: Distance both surfaces may move before partners are looked for anew, as a fraction of the mean slave facet's size.
@@ -72,7 +72,7 @@ class PartnerSearch:
         self,
         memory: Memory,
         name: str,
-        slave: OuterSurface,
+        slave: SlaveSurface,
         master: Master,
         points: Points,
         count: int,
@@ -84,18 +84,20 @@ class PartnerSearch:
         self._count = count
         nodes = slave.reference, master.reference
         self._start = points, nodes
-        self._known = memory.value(f"{name}: partners", _Known(np.zeros(len(points.x), dtype=bool)))
-        self._found = memory.value(f"{name}: search", self._look_around(points, nodes, search, 0))
+        known = _Known(np.zeros(len(points.x), dtype=bool))
+        self._known = memory.value(f"{name}: partners", known, places=slave.places)
+        first = self._look_around(points, nodes, search, 0)
+        self._found = memory.cache(first, lambda found: replace(first, version=found.version + 1))
 
     @property
     def facets(self) -> tuple[Indices, Indices]:
         """Slave and master facets that are near each other."""
-        return self._found.trial.facets
+        return self._found.value.facets
 
     @property
     def version(self) -> int:
         """Number that grows when other facets have come near each other."""
-        return self._found.trial.version
+        return self._found.value.version
 
     def nodes(self) -> Indices:
         """Global nodes on which pairs of near facets act, those of the slave facet first; slave facets of this rank."""
@@ -142,7 +144,7 @@ class PartnerSearch:
         reach = self._reach(nodes)
         if self._moved(nodes, reach):
             # what has come near is no part of the step: it stays known if the step is given up
-            self._found.set(self._look_around(points, nodes, reach, self.version))
+            self._found.value = self._look_around(points, nodes, reach, self.version)
         slaves, masters = self.facets
         of_facet = slaves[:, None] * self._count + np.arange(self._count)
         pairs = of_facet.ravel(), np.repeat(masters, self._count)
@@ -199,7 +201,7 @@ class PartnerSearch:
 
     def _moved(self, nodes: tuple[Array, Array], reach: float) -> bool:
         """Whether rays may have come nearer to other facets than the margin since these were last searched."""
-        found = self._found.trial
+        found = self._found.value
         slave, master = (np.abs(now - then).max(initial=0.0) for now, then in zip(nodes, found.nodes, strict=True))
         farther = max(reach - found.reach, 0.0)
         total = self._slave.maximum(float(np.nan_to_num(slave + master + farther, nan=np.inf)))

@@ -17,7 +17,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import check_friction, completed
-from cutsim.pairs.outer_surface import OuterSurface, SharedSurface
+from cutsim.pairs.outer_surface import SharedSurface, SlaveSurface
 from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.partners import PairKinematics
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
@@ -102,7 +102,7 @@ class SurfacePair(Term):
             doubt_law(state.verdict, name, law, young, sizes[0])
         rubbing = completed(friction, self.contact.stiffness) if friction else None
         laws = PairLaws(law, self.contact, rubbing, allowed_penetration, allowed_slip)
-        surfaces = [OuterSurface(state.V, p.facets) for p in points]
+        surfaces = [SlaveSurface(state.V, p) for p in points]
         self.facets = tuple(p.facets for p in points)
         self.entities = np.concatenate([np.column_stack([s.cells, s.local])[s.owned].ravel() for s in surfaces])
         masters = [SharedSurface(s) for s in surfaces]

@@ -30,7 +30,7 @@ def slave_points(state: State, facets: NDArray[np.int32], measure: ufl.Measure) 
     """
     degree = state.V.element.basix_element.degree
     require("degree", degree, degree in DEGREES, "1 or 2: fields on the surfaces of a pair")
-    return FacetPoints(state.mesh, facets, measure, interior=False, degree=DEGREES[degree])
+    return FacetPoints(state.mesh, facets, measure, interior=False, degree=DEGREES[degree], ordered=True)
 
 
 class SurfacePass:

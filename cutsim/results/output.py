@@ -11,6 +11,7 @@ import shutil
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import chain, count
 from numbers import Integral
 from pathlib import Path
 from types import TracebackType
@@ -24,8 +25,11 @@ from ufl.core.expr import Expr
 
 from cutsim.base import compat
 from cutsim.base.checks import require
+from cutsim.base.files import replace_file
 from cutsim.base.units import Units
 
+#: Name of the file with the rows of a run.
+HISTORY = "history.csv"
 _TAKEN = ("displacement", "fields")
 # bytes to be left on the disk, for what ADIOS2 writes beside the fields and when it closes its files
 _RESERVE = 4_000_000
@@ -60,14 +64,17 @@ class HistoryWriter(Closing):
         columns: Name of each column -> kind of quantity (see `cutsim.base.units.KINDS`), in the order of the file.
         units: Units for the header.
         comm: Communicator of the run; its first rank writes.
+        rows: Rows of an older file of the same columns that are kept; those beyond are removed.
 
     Raises:
-        ValueError: If there are no columns, a kind is unknown, or a name has a comma, bracket, quote or line
-            break.
+        ValueError: If there are no columns, a kind is unknown, a name has a comma, bracket, quote or line break, or an
+            older file that is gone on with has other columns or fewer rows.
         OSError: If the file cannot be opened, on all ranks.
     """
 
-    def __init__(self, path: Path | str, columns: Mapping[str, str], units: Units, comm: MPI.Comm) -> None:
+    def __init__(
+        self, path: Path | str, columns: Mapping[str, str], units: Units, comm: MPI.Comm, rows: int = 0
+    ) -> None:
         require("columns", dict(columns), len(columns) > 0, "at least one column")
         for name in columns:
             plain = bool(name.strip()) and not set(name) & set(',[]"\r\n')
@@ -75,7 +82,7 @@ class HistoryWriter(Closing):
         self._comm, self._names = comm, tuple(columns)
         self._file: TextIO | None = None
         header = [units.label(name, kind) for name, kind in columns.items()]
-        on_root(comm, lambda: self._open(Path(path), header))
+        on_root(comm, lambda: self._open(Path(path), header, rows))
 
     def append(self, row: Mapping[str, float]) -> None:
         """Write one row. Collective.
@@ -99,16 +106,60 @@ class HistoryWriter(Closing):
             self._file.close()
             self._file = None
 
-    def _open(self, path: Path, header: list[str]) -> None:
+    def sync(self) -> None:
+        """Make sure that the rows so far survive a loss of power. Collective."""
+        on_root(self._comm, lambda: os.fsync(self._file.fileno()) if self._file is not None else None)
+
+    def _open(self, path: Path, header: list[str], rows: int) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = path.open("w", encoding="utf-8", newline="")
-        self._write(header)
+        if rows:
+            replace_file(path, _kept_rows(path, header, rows).encode())
+        self._file = path.open("a" if rows else "w", encoding="utf-8", newline="")
+        if not rows:
+            self._write(header)
 
     def _write(self, cells: list[str]) -> None:
         if self._file is None:
             raise ValueError("the history is closed, no row can be written")
         csv.writer(self._file, lineterminator="\n").writerow(cells)
         self._file.flush()
+
+
+def first_rows(path: Path, rows: int, comm: MPI.Comm) -> dict[str, list[float]]:
+    """The first rows of a history. Collective.
+
+    Args:
+        path: The file.
+        rows: Number of rows.
+        comm: Communicator of the run.
+
+    Returns:
+        Column name without its unit -> values, on all ranks.
+
+    Raises:
+        ValueError: There are fewer rows.
+        OSError: It cannot be read, on all ranks.
+    """
+    table: dict[str, list[float]] = {}
+
+    def read() -> None:
+        columns = read_history(path)
+        found = min(len(values) for values in columns.values())
+        if found < rows:
+            raise ValueError(f"{path} has {found} rows, fewer than the {rows} that were written before the checkpoint")
+        table.update({name: values[:rows].tolist() for name, values in columns.items()})
+
+    on_root(comm, read)
+    return dict(comm.bcast(table))
+
+
+def _kept_rows(path: Path, header: list[str], rows: int) -> str:
+    """The header and the first rows of a history that is gone on with."""
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    older = next(csv.reader(lines[:1]))
+    if older != header:
+        raise ValueError(f"{path} has other columns: {sorted(set(older) ^ set(header))} are in one of both only")
+    return "".join(lines[: 1 + rows])
 
 
 def read_history(path: Path | str) -> dict[str, NDArray[np.float64]]:
@@ -151,27 +202,13 @@ def write_summary(path: Path | str, values: Mapping[str, Any], comm: MPI.Comm) -
     on_root(comm, write)
 
 
-def replace_file(path: Path | str, data: bytes) -> None:
-    """Write a file in one go: a reader sees the old or the new one, never half of it. Call it on one rank.
-
-    Args:
-        path: The file; folders are made.
-        data: What it will hold.
-    """
-    target = Path(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = target.with_name(target.name + ".part")
-    draft.write_bytes(data)
-    os.replace(draft, target)
-
-
 def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False, subfolders: bool = True) -> None:
     """Make sure that a folder has no results of an older run. Collective.
 
     Args:
         folder: The folder; it need not exist.
         comm: Communicator of the run.
-        overwrite: Whether older histories and summaries are removed; else they are refused.
+        overwrite: Whether older histories, summaries and fields are removed; else they are refused.
         subfolders: Whether the same holds for its subfolders.
 
     Raises:
@@ -179,7 +216,7 @@ def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False,
     """
 
     def claim() -> None:
-        older = sorted(Path(folder).glob("**/history.csv" if subfolders else "history.csv"))
+        older = sorted(Path(folder).glob(f"**/{HISTORY}" if subfolders else HISTORY))
         if older and not overwrite:
             raise FileExistsError(
                 f"{older[0]} is of an older run: choose another folder, or have it overwritten (overwrite=True, "
@@ -188,6 +225,8 @@ def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False,
         for history in older:
             history.unlink()
             history.with_name("summary.json").unlink(missing_ok=True)
+            for fields in history.parent.glob("*.bp"):
+                shutil.rmtree(fields)
 
     on_root(comm, claim)
 
@@ -211,6 +250,9 @@ class FieldWriter(Closing):
         derived: Name -> UFL expression of a scalar, vector or tensor on the mesh of u; compiled once, here.
         surfaces: File name without suffix -> functions on one submesh of crack facets, of one element (DG 0
             or 1), known in the file by their own names.
+        anew: Whether files that are there are replaced; else those of the second part of a run are
+            ``displacement_2.bp`` and so on, and of later parts ``displacement_3.bp``: nothing can be added to a VTX
+            file that was closed.
 
     Raises:
         ValueError: If a name is taken.
@@ -222,6 +264,8 @@ class FieldWriter(Closing):
         u: fem.Function,
         derived: Mapping[str, Expr] | None = None,
         surfaces: Mapping[str, Sequence[fem.Function]] | None = None,
+        *,
+        anew: bool = True,
     ) -> None:
         derived, surfaces = derived or {}, surfaces or {}
         for name in surfaces:
@@ -238,8 +282,9 @@ class FieldWriter(Closing):
         self._bytes = comm.allreduce(sum(_bytes(f) for functions in groups.values() for f in functions))
         on_root(comm, self._check_space)
         self._stack = ExitStack()
+        part = "" if anew else comm.bcast(_next_part(self._directory))
         self._writers = [
-            self._stack.enter_context(io.VTXWriter(comm, f"{directory}/{stem}.bp", functions, engine="BP4"))
+            self._stack.enter_context(io.VTXWriter(comm, f"{directory}/{stem}{part}.bp", functions, engine="BP4"))
             for stem, functions in groups.items()
             if functions
         ]
@@ -269,6 +314,12 @@ class FieldWriter(Closing):
     def close(self) -> None:
         """Close the files. Collective; a second call does nothing."""
         self._stack.close()
+
+
+def _next_part(folder: Path) -> str:
+    """What distinguishes the files of the next part of a run."""
+    parts = (f"_{number}" for number in count(2))
+    return next(part for part in chain([""], parts) if not (folder / f"displacement{part}.bp").exists())
 
 
 def _bytes(f: fem.Function) -> int:

@@ -12,12 +12,13 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
+from cutsim.analysis.stepping import Problem, StepReport
 from cutsim.base.checks import nonnegative, require, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Columns, FacetShowing, offering
 from cutsim.base.units import Units
-from cutsim.results.output import FieldWriter, HistoryWriter, claim_folder, write_summary
+from cutsim.results.checkpoints import Checkpoints, ended_together
+from cutsim.results.output import HISTORY, FieldWriter, HistoryWriter, claim_folder, first_rows, write_summary
 from cutsim.results.progress import Progress
 
 
@@ -47,12 +48,16 @@ class Recording:
         derived: Name → UFL expression of fields such as stress.
         every: Fields are written every so many steps, ≥ 1; 0 for no fields.
         overwrite: Whether the results of an older run in the folder are replaced.
+        checkpoints: Writes checkpoints during the run and at its end. A problem that was resumed from one goes on in
+            its folder: rows of the history after the checkpoint are removed, and fields go to files of their own
+            (``displacement_2.bp`` and so on).
 
     Attributes:
         history: Column → list of values so far, the same on all ranks.
 
     Raises:
         FileExistsError: The folder has the history of an older run, which is not to be overwritten.
+        ValueError: The history of a resumed run has fewer rows than were written before the checkpoint.
     """
 
     def __init__(
@@ -68,21 +73,40 @@ class Recording:
         derived: Mapping[str, Expr] | None = None,
         every: int = 5,
         overwrite: bool = False,
+        checkpoints: Checkpoints | None = None,
     ) -> None:
         require_number("every", every, nonnegative)
         self.folder, self.problem, self._units = Path(folder), problem, units or Units()
         self._title, self._until, self._values = title, until, dict[str, Any]()
-        claim_folder(self.folder, problem.state.mesh.comm, overwrite=overwrite, subfolders=False)
-        self._show, self._extra, self._every = dict(show or {}), extra, every
-        self.history: dict[str, list[float]] = {}
-        self._stack = ExitStack()
+        self._show, self._extra = dict(show or {}), extra
+        self._checkpoints, self._stack = checkpoints, ExitStack()
+        resumed = self._claim(overwrite=overwrite)
+        self.history = self._older() if resumed else dict[str, list[float]]()
         self._table: HistoryWriter | None = None
         comm, start = problem.state.mesh.comm, problem.state.time_old
         self._progress = self._stack.enter_context(Progress(until, comm, title, start=start))
-        self._written = problem.state.memory.value(f"recording: {title}", _Written())
         self._fields: _FieldFiles | None = None
         if every:
-            self._fields = _FieldFiles(self.folder, problem, derived or {}, self._stack)
+            self._fields = _FieldFiles(self.folder, problem, derived or {}, every, self._stack, anew=not resumed)
+
+    def _claim(self, *, overwrite: bool) -> bool:
+        """Make sure that the folder is that of this run; whether a resumed run goes on there. Collective."""
+        memory, comm, name = self.problem.state.memory, self.problem.state.mesh.comm, f"recording: {self._title}"
+        resumed: bool = name in memory.awaited and comm.bcast((self.folder / HISTORY).exists())
+        if not resumed:
+            claim_folder(self.folder, comm, overwrite=overwrite, subfolders=False)
+        if not resumed and self._checkpoints is not None:
+            self._checkpoints.clear()
+        self._written = memory.value(name, _Written())
+        if not resumed:
+            # the rows in another folder count from there
+            self._written.set(_Written())
+        return resumed
+
+    def _older(self) -> dict[str, list[float]]:
+        """The history up to the checkpoint."""
+        rows, path = self._written.committed.rows, self.folder / HISTORY
+        return first_rows(path, rows, self.problem.state.mesh.comm) if rows else {}
 
     def __call__(self, report: StepReport) -> None:
         """Record an accepted step. Collective."""
@@ -94,7 +118,8 @@ class Recording:
         comm = self.problem.state.mesh.comm
         if self._table is None:
             kinds = {name: kind for name, (_, kind) in columns.items()}
-            table = HistoryWriter(self.folder / "history.csv", kinds, self._units, comm)
+            rows = self._written.committed.rows
+            table = HistoryWriter(self.folder / HISTORY, kinds, self._units, comm, rows)
             self._table = self._stack.enter_context(table)
         row = {name: value for name, (value, _) in columns.items()}
         for name, value in row.items():
@@ -104,14 +129,22 @@ class Recording:
         self._progress.update(report.time, step=report.number, **shown, iterations=report.outcome.iterations)
         written = self._written.committed
         self._written.set(replace(written, rows=written.rows + 1, pending=report.time))
-        if self._every and report.number % self._every == 0:
+        if self._fields is not None and report.number % self._fields.every == 0:
             self.write_fields(report.time)
+        if self._checkpoints is not None and self._checkpoints.due():
+            self._save(self._checkpoints)
 
     def write_fields(self, time: float) -> None:
         """Write the fields of the present state. Collective."""
         self._written.set(replace(self._written.committed, pending=None))
         if self._fields is not None:
             self._fields.write(time)
+
+    def _save(self, checkpoints: Checkpoints) -> None:
+        """Write a checkpoint; the rows that it counts come to the disk before it."""
+        if self._table is not None:
+            self._table.sync()
+        checkpoints.save()
 
     def summary(self, values: Mapping[str, Any] | None = None) -> None:
         """Write ``summary.json``: verdict and reasons, how far the run came, and headline numbers. Collective.
@@ -151,11 +184,12 @@ class Recording:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         state = self.problem.state
-        # only these ends are known to be met by all ranks
-        together = kind is None or issubclass(kind, StepError | Interrupted)
+        together = ended_together(kind)
         with self._stack:
             if together and (pending := self._written.committed.pending) is not None:
                 self.write_fields(pending)
+            if together and self._checkpoints is not None:
+                self._save(self._checkpoints)
             if not together:
                 state.verdict.doubt("failed", f"ended at time {state.time_old:.6g} of {self._until:.6g} by {error!r}")
         summary = MPI.COMM_SELF if not together else state.mesh.comm
@@ -165,12 +199,15 @@ class Recording:
 
 
 class _FieldFiles:
-    """Files with the fields of a problem, those of its facets among them; collective."""
+    """Files with the fields of a problem every so many steps, those of its facets among them; collective."""
 
-    def __init__(self, folder: Path, problem: Problem, derived: Mapping[str, Expr], stack: ExitStack) -> None:
+    def __init__(
+        self, folder: Path, problem: Problem, derived: Mapping[str, Expr], every: int, stack: ExitStack, *, anew: bool
+    ) -> None:
+        self.every = every
         self._facets = [_FacetFields(t) for t in offering(problem.terms, FacetShowing) if t.facet_fields]
         surfaces = {facets.term.name: facets.functions for facets in self._facets}
-        writer = FieldWriter(folder, problem.state.u, {**problem.fields, **derived}, surfaces)
+        writer = FieldWriter(folder, problem.state.u, {**problem.fields, **derived}, surfaces, anew=anew)
         self._writer = stack.enter_context(writer)
 
     def write(self, time: float) -> None:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cutsim.base.files import replace_file
 from cutsim.base.units import Units
-from cutsim.results.output import replace_file
 
 if TYPE_CHECKING:
     import pyvista

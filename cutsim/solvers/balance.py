@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.base.places import Places
 from cutsim.base.terms import Columns, Constrained, Diagnosing, Showing, Term, offering
 from cutsim.fields.constraints import Constraints, Prescribed
 from cutsim.fields.state import State
@@ -104,7 +105,8 @@ class Balance(Generic[T, H]):
             **solver,
         )
         self._kept = state.memory.value(f"{name}: solver", self.problem.kept, self._keep)
-        self._residual = state.memory.value(f"{name}: residual", np.zeros(len(self.problem.fixed)))
+        places = Places.owned(unknown.function_space)
+        self._residual = state.memory.value(f"{name}: residual", np.zeros(len(self.problem.fixed)), places=places)
 
     def _keep(self, kept: Kept) -> None:
         if kept != self.problem.kept:

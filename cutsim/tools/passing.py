@@ -67,7 +67,9 @@ class Passing:
                 f"{tool.name} begins {-nearest:.3g} behind the nearest point of what it can touch: inside the body, or "
                 "beyond it",
             )
-        self._known = tool.state.memory.value(f"{tool.name}: passing", _Seen(seen, (nearest, facing)))
+        start = _Seen(seen, (nearest, facing))
+        places = {"contact": [p.surface.points.places for p in patches], "nearest": None}
+        self._known = tool.state.memory.value(f"{tool.name}: passing", start, places=places)
 
     def objection(self) -> str | None:
         """In words, whether the tool has come through the surface in this step; None if it has not."""

@@ -19,7 +19,7 @@ from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, check_friction, completed
-from cutsim.pairs.outer_surface import OuterSurface
+from cutsim.pairs.outer_surface import OuterSurface, SlaveSurface
 from cutsim.pairs.overlap import inside_surface
 from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.pairing import Array, FacetShape, Indices
@@ -121,7 +121,7 @@ class TriangulatedTool(RigidTool):
         master = RigidSurface(surface, self._position)
         self.contact, self.surface = contact, surface
         self._normal_size = points.mean(normal_size(state.mesh, points.facets))
-        slave = OuterSurface(state.V, points.facets)
+        slave = SlaveSurface(state.V, points)
         kinematics = PairKinematics(
             state.memory, name, slave, master, small_sliding=False, search=search or size, size=size
         )

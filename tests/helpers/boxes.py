@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from cutsim.base.compat import create_mesh, geometry_nodes
 from cutsim.bodies.loads import Support
+from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
 from cutsim.pairs.surface_pair import SurfacePair
 from helpers.laws import E
@@ -68,8 +69,8 @@ class Stack:
         ]
 
 
-def stack(*boxes, simplices=False, degree=1, comm=MPI.COMM_WORLD):
-    """A mesh of boxes (low corner, high corner, numbers of cells)."""
+def stack(*boxes, simplices=False, degree=1, comm=MPI.COMM_WORLD, cracked=None):
+    """A mesh of boxes (low corner, high corner, numbers of cells), cracked where positions fulfil a condition."""
     gdim = len(boxes[0][0])
     create, *kinds = KINDS[gdim]
     kind = kinds[simplices]
@@ -84,7 +85,10 @@ def stack(*boxes, simplices=False, degree=1, comm=MPI.COMM_WORLD):
     x = np.concatenate(x) if x else np.empty((0, gdim))
     element = basix.ufl.element("Lagrange", kind.name, 1, shape=(gdim,))
     domain = create_mesh(comm, cells.astype(np.int64), x, element)
-    return Stack(State(fem.functionspace(domain, ("Lagrange", degree, (gdim,)))), boxes)
+    element = ("Lagrange", degree, (gdim,))
+    if cracked is None:
+        return Stack(State(fem.functionspace(domain, element)), boxes)
+    return Stack(State(cracked_space(domain, element, mesh.locate_entities(domain, gdim - 1, cracked))), boxes)
 
 
 def two(gdim, n=(2, 3), overhang=0.0, **options):
