@@ -9,6 +9,7 @@ import sys
 import time
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,9 +18,11 @@ from typer.testing import CliRunner
 
 import cutsim
 from cutsim.analysis.stepping import StepError
-from cutsim.commands import launch
+from cutsim.commands import case_files, launch, new
 from cutsim.commands.endings import Ending, endings
+from cutsim.commands.jobs import Job, Runner
 from cutsim.commands.main import COMMANDS, app
+from cutsim.commands.variation import Variation, variants
 
 runner = CliRunner()
 COARSE = [0, 1, 2, 3, 4]
@@ -124,6 +127,72 @@ def test_start_of_ranks_refuses_nonsense(capsys):
     assert launch.main(["-n", "0", "script.py"]) == 2
     assert "'0'" in capsys.readouterr().err
     assert launch.main([]) == 2
+
+
+# -- case files -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def library(tmp_path, monkeypatch):
+    """One built-in case, in a folder of its own."""
+    folder = tmp_path / "library"
+    folder.mkdir()
+    (folder / "cut.toml").write_text('title = "A cut"\n[law]\ntoughness = 0.8  # energy of new surface\n')
+    monkeypatch.setattr(case_files, "LIBRARY", folder)
+    monkeypatch.chdir(tmp_path)
+    return folder
+
+
+def test_built_in_cases_are_listed_and_copied(library, tmp_path):
+    assert cells(runner.invoke(app, ["cases"]), "cut") == ["cut", "A", "cut"]
+    assert runner.invoke(app, ["new", "--from", "cut"]).exit_code == 0
+    assert Path("cut.toml").read_text() == (library / "cut.toml").read_text()
+    again = runner.invoke(app, ["new", "--from", "cut"])
+    assert again.exit_code == 2 and "--overwrite" in again.stderr
+    assert runner.invoke(app, ["new", "--from", "cut", "--overwrite"]).exit_code == 0
+
+
+def test_unknown_case_and_questions_without_a_terminal(library):
+    unknown = runner.invoke(app, ["new", "--from", "cutt"])
+    assert unknown.exit_code == 2 and "did you mean cut?" in unknown.stderr
+    asked = runner.invoke(app, ["new"])
+    assert asked.exit_code == 2 and "--from" in asked.stderr
+
+
+def test_answers_keep_the_comments_of_the_file(library, monkeypatch):
+    answers = {"title (what is simulated, in a few words)": "Mine", "law.toughness (energy of new surface)": "1.5 N/mm"}
+    defaults = {}
+
+    def text(message, default, validate):
+        defaults[message] = default
+        return SimpleNamespace(unsafe_ask=lambda: answers[message])
+
+    monkeypatch.setattr(new, "_choice", lambda: "cut")
+    monkeypatch.setattr("questionary.text", text)
+    assert runner.invoke(app, ["new", "-o", "mine.toml"]).exit_code == 0
+    assert list(defaults.values()) == ["A cut", "0.8"]
+    mine = Path("mine.toml").read_text()
+    assert 'title = "Mine"\n' in mine and 'toughness = "1.5 N/mm"  # energy of new surface' in mine
+
+
+def test_variations():
+    assert Variation.of("tool.friction=0.1:0.4:4").values == ("0.1", "0.2", "0.3", "0.4")
+    assert Variation.of("law.toughness=1:100:3:log").values == ("1", "10", "100")
+    both = [Variation.of(text) for text in ("a.x=1,2", "b.x=3 N/mm", "b.y=4,5")]
+    found = variants(both)
+    assert [variant.name for variant in found] == [f"a.x={x}_b.x=3-N-mm_y={y}" for x in (1, 2) for y in (4, 5)]
+    assert found[1].values == {"a.x": "1", "b.x": "3 N/mm", "b.y": "5"}
+    for wrong in ("friction", "x=", "x=1:2", "x=1:2:1", "x=-1:1:3:log", "x=1:2:3:4", "x=a:b:3", "x=1,,2"):
+        with pytest.raises(typer.BadParameter, match="must be of the form"):
+            Variation.of(wrong)
+
+
+def test_jobs_are_processes_that_keep_their_exit_status(tmp_path):
+    jobs = [Job(tmp_path / name, arguments) for name, arguments in (("good", ("--version",)), ("bad", ("nonsense",)))]
+    ended = {}
+    Runner(tmp_path / "jobs", 2, "local", {}).run(jobs, lambda job, status: ended.update({job.folder.name: status}))
+    assert ended == {"good": 0, "bad": 2}
+    assert jobs[0].log.read_text() == f"cutsim {cutsim.__version__}\n"
 
 
 # -- results ----------------------------------------------------------------------------------------------------------

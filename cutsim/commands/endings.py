@@ -25,6 +25,11 @@ class Ending(IntEnum):
     INTERNAL = 70
     INTERRUPTED = 130
 
+    @property
+    def words(self) -> str:
+        """How the command has ended, in a word or two."""
+        return self.name.lower().replace("_", " ")
+
 
 @contextmanager
 def endings() -> Iterator[None]:

@@ -11,12 +11,13 @@ import typer
 from typer.core import TyperGroup
 
 import cutsim
-from cutsim.commands import compare, doctor, fit_material, launch, plot
+from cutsim.commands import cases, compare, doctor, fit_material, launch, new, plot
 from cutsim.commands.endings import endings
 from cutsim.commands.options import show_messages
 
 #: Heading of the help → commands: name → module with the function `command` and its `EXAMPLES`.
 COMMANDS: dict[str, dict[str, ModuleType]] = {
+    "Begin": {"cases": cases, "new": new},
     "Look at results": {"plot": plot, "compare": compare},
     "Find parameters": {"fit-material": fit_material},
     "Help": {"doctor": doctor},
