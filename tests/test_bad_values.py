@@ -43,7 +43,8 @@ def world():
     triangle = cutsim.Triangulation(np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), np.array([(0, 1), (1, 2), (2, 0)]))
     return {
         "blocks": b, "state": b.state, "V": b.state.V, "mesh": b.state.mesh, "space": space, "temperature": temperature,
-        "facets": top, "entities": top, "vertices": np.arange(1, dtype=np.int32), "slave_facets": b.face(0, 0.0), "master_facets": b.face(0, 1.0),
+        "facets": top, "entities": top, "vertices": np.arange(1, dtype=np.int32),
+        "slave_facets": b.face(0, 0.0), "master_facets": b.face(0, 1.0),
         "contact": contact, "path": path, "crack": crack, "surface": surface, "surfaces": [surface], "tool": tool,
         "tools": [tool], "pair": pair, "solid": solid, "material": ELASTIC, "matrix": ELASTIC, "mechanics": mechanics,
         "layers": layers, "domain": laminated, "triangle": triangle, "comm": COMM, "body": body,
