@@ -1,8 +1,10 @@
 """Case: all of a simulation, as a case file says it."""
 
 import tomlkit
+from mpi4py import MPI
 from pydantic import PrivateAttr
 
+from cutsim.cases.building import Simulation, build
 from cutsim.cases.document import Document
 from cutsim.cases.schema import CaseTables
 
@@ -22,3 +24,14 @@ class Case(CaseTables):
         """The case as one file: with what it extends, and with all changes."""
         tables = {key: value for key, value in self._document.tables.items() if key != "extends"}
         return tomlkit.dumps(tables)
+
+    def build(self, comm: MPI.Comm) -> Simulation:
+        """Put the case together: mesh it and compile its forms. Collective.
+
+        Args:
+            comm: Communicator of the run.
+
+        Raises:
+            CaseError: On all ranks: a group is missing in the mesh, or parts do not fit.
+        """
+        return build(self, self._document, comm)

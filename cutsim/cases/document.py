@@ -115,6 +115,16 @@ class Document:
         place, key = self.origin(keys)
         return ": ".join(filter(None, [place, key, "" if value is None else _short(value), words]))
 
+    def hurried(self) -> "Document":
+        """This document with its tables in ``[quick]``, which win."""
+        tables = dict(self.tables)
+        quick = tables.pop("quick", {})
+        if not isinstance(quick, Mapping):
+            return self
+        start = ("quick",)
+        origins = {keys[1:]: origin for keys, origin in self.origins.items() if keys[:1] == start and keys != start}
+        return Document(tables, self.origins).changed(Document(_unfold(quick), origins))
+
     def changed(self, other: "Document") -> "Document":
         """This document with the tables of another one, which wins."""
         return Document(_merged(self.tables, other.tables), {**self.origins, **other.origins})

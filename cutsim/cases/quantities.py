@@ -9,7 +9,9 @@ import pint
 from cutsim.base.checks import require
 from cutsim.base.units import Kind, Units
 
-_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*((?:1\s*/\s*)?[^\W\d_][^+\[\]{}'\"]*|[°%].*)")
+_QUANTITY = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?+)\s*((?:1\s*/\s*)?[^\W\d_][^+\[\]{}'\"]*|[°%].*)"
+)
 #: Powers of powers and long numbers, which would take for ever.
 _HARMFUL = re.compile(r"(\^|\*\*)[^/·]*(\^|\*\*)|\d{3}")
 _EXAMPLES = {"length": "mm", "force": "N", "time": "s"}

@@ -16,13 +16,14 @@ from cutsim.cases.scope import Scope
 from cutsim.cases.tables import FromTable
 
 
-def read_case(path: Path | str, changes: Mapping[str, str] | None = None) -> Case:
+def read_case(path: Path | str, changes: Mapping[str, str] | None = None, *, quick: bool = False) -> Case:
     """Read a case file.
 
     Args:
         path: The file.
         changes: New values by key, with dots, as the option ``--set`` of the command gives them:
             ``{"tool.friction": "0.3"}``. They win over the file, and it over those that it extends.
+        quick: Whether the tables in ``[quick]`` win over those of the file.
 
     Returns:
         The case, complete and checked as far as that is possible without a mesh.
@@ -31,6 +32,7 @@ def read_case(path: Path | str, changes: Mapping[str, str] | None = None) -> Cas
         CaseError: With one line for each thing that is wrong: file and line, key, value, and what is allowed.
     """
     document = load(Path(path))
+    document = document.hurried() if quick else document
     for key, text in (changes or {}).items():
         document = document.changed(setting(key, text))
     return _checked(document)

@@ -10,9 +10,9 @@ from cutsim.cases.expressions import RESERVED
 from cutsim.cases.quantities import consistent
 from cutsim.cases.schema_heat import Heat
 from cutsim.cases.schema_materials import AnyMaterial, Law
-from cutsim.cases.schema_mesh import Mesh
+from cutsim.cases.schema_mesh import Mesh, Selection
 from cutsim.cases.schema_parts import AnyTool, Body, Crack, Layer, Load, Pair, Support
-from cutsim.cases.schema_run import Analysis, AnyInsertion, Output, Solver, Steps
+from cutsim.cases.schema_run import Analysis, AnyInsertion, Measure, Output, Solver, Steps
 from cutsim.cases.tables import Free, FromTable, Table
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.materials.elastic import Material
@@ -50,6 +50,7 @@ class Parts(Table):
 
     Args:
         mesh: Mesh.
+        groups: Further groups of facets and cells by name, selected from those of the mesh.
         layers: Layers of a block, from the surface downwards; with the geometry "laminate".
         material: Material of bodies and layers that have none of their own.
         law: Cohesive law of cracks and layers that have none of their own.
@@ -64,6 +65,7 @@ class Parts(Table):
     """
 
     mesh: Mesh
+    groups: dict[Named, Selection] = Field(default_factory=dict)
     layers: tuple[Layer, ...] = ()
     material: AnyMaterial | None = None
     law: Law | None = None
@@ -100,13 +102,17 @@ class CaseTables(Parts, Header):
         analysis: Analysis.
         steps: Step control.
         solver: Solver.
+        measures: Further columns of the history by name.
         output: Output.
+        quick: Tables with a coarser mesh or a shorter run for a first try; they take part where this is asked for.
     """
 
     analysis: Analysis = Analysis()
     steps: Steps
     solver: Solver = Solver()
+    measures: dict[Named, Measure] = Field(default_factory=dict)
     output: Output = Output()
+    quick: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("*", mode="wrap")
     @classmethod

@@ -5,8 +5,8 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from cutsim.base.checks import require
-from cutsim.base.units import Number
-from cutsim.cases.names import ExistingFile, Geometry, GeometryParameter
+from cutsim.base.units import Length, Number
+from cutsim.cases.names import ExistingFile, Geometry, GeometryParameter, Groups
 from cutsim.cases.tables import Flag, Free, Table
 
 
@@ -22,6 +22,7 @@ class Mesh(Table):
         dim: Dimension of the mesh and of its space; by default that of the geometry, or 3 for a file.
         degree: Degree of the displacement.
         axisymmetric: Whether the mesh is the meridian plane of a body of revolution about x = 0.
+        open: Groups of facets along which the body is cut from the start, with nothing between the faces.
     """
 
     geometry: Geometry | None = None
@@ -32,6 +33,7 @@ class Mesh(Table):
     dim: Literal[2, 3] | None = None
     degree: Literal[1, 2] = 1
     axisymmetric: Flag = False
+    open: Groups = ()
 
     @model_validator(mode="after")
     def _one_source(self) -> "Mesh":
@@ -39,4 +41,31 @@ class Mesh(Table):
             raise ValueError("must have either geometry or file")
         require("only", list(self.only), self.geometry is None or not self.only, "left out beside a geometry")
         require("set", list(self.set), self.file is None or not self.set, "left out beside a file")
+        return self
+
+
+Range = tuple[Length, Length]
+
+
+class Selection(Table):
+    """Group of facets or cells, selected from groups of the mesh by the coordinates of their middles.
+
+    Args:
+        facets: Groups of facets from which it is selected.
+        cells: Groups of cells from which it is selected.
+        x: Lowest and highest x; by default any [length].
+        y: Lowest and highest y [length].
+        z: Lowest and highest z [length].
+    """
+
+    facets: Groups = ()
+    cells: Groups = ()
+    x: Range | None = None
+    y: Range | None = None
+    z: Range | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "Selection":
+        if bool(self.facets) == bool(self.cells):
+            raise ValueError("must have either facets or cells")
         return self

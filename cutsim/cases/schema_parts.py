@@ -17,10 +17,13 @@ from cutsim.tools.shapes import Shape
 Volumetric = Literal["auto", "full", "reduced", "mixed", "taylor-hood"]
 #: A component, or a vector.
 Direction = Annotated[
-    Annotated[Literal["x", "y", "z"], Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM
+    Annotated[Literal["x", "y", "z", "-x", "-y", "-z"], Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")],
+    FORM,
 ]
 AnyDirection = Annotated[
-    Annotated[Literal["x", "y", "z", "all"], Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM
+    Annotated[Literal["x", "y", "z", "-x", "-y", "-z", "all"], Tag("<single>")]
+    | Annotated[tuple[Number, ...], Tag("<list>")],
+    FORM,
 ]
 Displacement = Annotated[TimeValue, Varying("length")]
 
@@ -229,7 +232,8 @@ class Support(Table):
         cells: Groups of cells that it holds.
         vertices: Groups of vertices that it holds.
         points: Points of which it holds the nearest vertices [length].
-        direction: Along which the displacement is prescribed: "x", "y", "z", a vector, or "all" for each component.
+        direction: Along which the displacement is prescribed: "x", "-x" and so on, a vector, or "all" for each
+            component. The reaction counts along it.
         value: Displacement [length].
         corners: Times at which its velocity jumps; those of a table are known [time].
     """

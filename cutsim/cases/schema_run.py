@@ -8,7 +8,7 @@ from pydantic_core import CoreSchema
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.units import Length, Number, Time
 from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
-from cutsim.cases.names import ToolName
+from cutsim.cases.names import BodyName, CrackName, ToolName
 from cutsim.cases.tables import Constructed, Flag, FromTable, Table, Whole, With, annotated, made, table_of
 from cutsim.studies.drive import Drive
 from cutsim.studies.fixture import STANDING, Fixture
@@ -97,10 +97,57 @@ class Solver(Table):
     petsc: dict[str, Plain] = Field(default_factory=dict)
 
 
+class Front(Table):
+    """Place of a crack front, as a column of the history.
+
+    Args:
+        crack: Name of the crack.
+        axis: Coordinate along which it grows.
+        quantity: Quantity that tells where the front is.
+        level: Level below which this falls at the front; one half of the damage by default.
+    """
+
+    kind: Literal["front"]
+    crack: CrackName
+    axis: Literal["x", "y", "z"] = "x"
+    quantity: Literal["damage", "opening", "sliding"] = "damage"
+    level: Number = 0.5
+
+
+class DomainIntegral(Table):
+    """J-integral of a crack front over a domain around it, as a column of the history.
+
+    Args:
+        body: Name of the body around the front.
+        tip: A point of the front [length].
+        direction: Direction in which the crack grows.
+        inner: Radius of the part of the domain that moves along, < outer [length].
+        outer: Radius of the domain [length].
+        front: Direction of the straight front in 3-D.
+        length: Length of the front in the body; in 2-D the thickness, 1 [length].
+    """
+
+    kind: Literal["j-integral"]
+    body: BodyName = "body"
+    tip: tuple[Length, ...]
+    direction: tuple[Number, ...]
+    inner: Length
+    outer: Length
+    front: tuple[Number, ...] | None = None
+    length: Length | None = None
+
+
+Measure = Annotated[Front | DomainIntegral, Field(discriminator="kind")]
+
+
 class Output(Table):
     """Output.
 
     Args:
+        curve: Columns of the history for abscissa and ordinate of the curve that tells most; by default depth and force
+            of an insertion, else of the first tool, or of the first support that moves.
+        mirror: Planes of symmetry through the origin in which pictures show the whole body, by the axes normal to them;
+            that of an insertion is known.
         every: Fields are written every so many steps; 0 for none.
         stress: Whether stresses are written.
         format: Files for ParaView: "vtx" needs ADIOS, "vtu" nothing.
@@ -108,6 +155,8 @@ class Output(Table):
         report: Whether a report is made at the end.
     """
 
+    curve: tuple[str, str] | None = None
+    mirror: tuple[Literal["x", "y", "z"], ...] = ()
     every: Whole = 5
     stress: Flag = True
     format: Literal["vtx", "vtu"] = "vtx"

@@ -45,7 +45,10 @@ class Scope(Numbers):
         if kind == "parameters of the geometry":
             return None if self.outline is None else self.outline.parameters
         if kind == "groups":
-            return self._groups if self._groups is not None or self.outline is None else self.outline.groups
+            groups = self._groups if self._groups is not None or self.outline is None else self.outline.groups
+            return None if groups is None else [*groups, *self._entries("groups")]
+        if kind == "bodies":
+            return self._entries(kind) or ["body"]
         if kind == "surfaces":
             groups, cracks = self.names("groups"), self._entries("cracks")
             return None if groups is None else [*groups, *(f"{crack}{side}" for crack in cracks for side in "+-")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import basix.ufl
@@ -75,6 +75,21 @@ class TaggedMesh:
             ValueError: If no group of facets has this name.
         """
         return self._find(name, self.mesh.topology.dim - 1)
+
+    def with_group(self, name: str, dim: int, entities: NDArray[np.int32]) -> TaggedMesh:
+        """This mesh with one more group, which its tags do not show.
+
+        Args:
+            name: Name of the group.
+            dim: Dimension of its entities.
+            entities: The local ones, ghosts included.
+
+        Raises:
+            ValueError: There is a group of this name.
+        """
+        require("name", name, name not in self.names, "other than that of a group")
+        tag = 1 + max((tag for _, tag in self.names.values()), default=0)
+        return replace(self, names={**self.names, name: (dim, tag)}, groups={**self.groups, (dim, tag): entities})
 
     def _find(self, name: str, dim: int) -> NDArray[np.int32]:
         known = [key for key, (d, _) in self.names.items() if d == dim]

@@ -1,0 +1,163 @@
+"""Mesh of a case, with the groups that the case names."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+from dolfinx.mesh import compute_midpoints, locate_entities
+from mpi4py import MPI
+from numpy.typing import NDArray
+
+from cutsim.cases.document import Document
+from cutsim.cases.geometries import LAMINATE, outline
+from cutsim.cases.keys import Keys, nearest
+from cutsim.cases.refusals import refused, refusing
+from cutsim.cases.schema import CaseTables
+from cutsim.cases.schema_mesh import Selection
+from cutsim.fields.laminate import laminate
+from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_msh
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+
+Entities = NDArray[np.int32]
+# what entities of a codimension are called
+_KINDS = {0: "cells", 1: "facets"}
+# parameters of `laminate` that are whole numbers
+_COUNTS = ("least", "rows")
+
+
+@dataclass(frozen=True)
+class Domain:
+    """Mesh of a case, and its entities by the names that the case gives them.
+
+    Attributes:
+        tables: The tables of the case.
+        document: Their text.
+        tagged: The mesh with its groups.
+    """
+
+    tables: CaseTables
+    document: Document
+    tagged: TaggedMesh
+
+    @classmethod
+    def of(cls, tables: CaseTables, document: Document, comm: MPI.Comm) -> "Domain":
+        """Mesh a case. Collective.
+
+        Raises:
+            CaseError: On all ranks, if the file is no mesh or the geometry refuses a parameter.
+        """
+        with refusing(document, "mesh"):
+            tagged = _meshed(tables, document, comm)
+        for name, selection in tables.groups.items():
+            tagged = cls(tables, document, tagged)._with(name, selection)
+        return cls(tables, document, tagged)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of all groups."""
+        return list(self.tagged.names)
+
+    def cells(self, key: Keys, names: Sequence[str]) -> Entities:
+        """Local cells, ghosts included, of some groups.
+
+        Args:
+            key: Key of the case that names them, for messages.
+            names: The groups.
+
+        Raises:
+            CaseError: The mesh has no such group of cells.
+        """
+        return self._entities(key, names, self.tagged.mesh.topology.dim)
+
+    def facets(self, key: Keys, names: Sequence[str]) -> Entities:
+        """Local facets, ghosts included, of some groups; as `cells`."""
+        return self._entities(key, names, self.tagged.mesh.topology.dim - 1)
+
+    def _entities(self, key: Keys, names: Sequence[str], dim: int) -> Entities:
+        known = {name: group for name, group in self.tagged.names.items() if group[0] == dim}
+        for name in names:
+            if name not in known:
+                kind = _KINDS.get(self.tagged.mesh.topology.dim - dim, "vertices")
+                words = f"{name!r} is no group of {kind} of the mesh{nearest(name, known)}"
+                raise refused(self.document, key, f"{words}; it has {', '.join(known) or 'none'}")
+        parts = [self.tagged.groups[known[name]] for name in names]
+        return np.unique(np.concatenate([np.empty(0, np.int32), *parts])).astype(np.int32)
+
+    def _with(self, name: str, selection: Selection) -> TaggedMesh:
+        """The mesh with one more group. Collective."""
+        key, mesh = ("groups", name), self.tagged.mesh
+        dim = mesh.topology.dim - (1 if selection.facets else 0)
+        if selection.facets:
+            entities = self.facets((*key, "facets"), selection.facets)
+        else:
+            entities = self.cells((*key, "cells"), selection.cells)
+        middles = compute_midpoints(mesh, dim, entities) if len(entities) else np.zeros((0, 3))
+        for axis, span in enumerate((selection.x, selection.y, selection.z)):
+            if span is not None:
+                inside = (span[0] <= middles[:, axis]) & (middles[:, axis] <= span[1])
+                entities, middles = entities[inside], middles[inside]
+        if not mesh.comm.allreduce(len(entities)):
+            raise refused(self.document, key, "no facet or cell has its middle there")
+        return self.tagged.with_group(name, dim, entities)
+
+    def vertices(self, key: Keys, names: Sequence[str]) -> Entities:
+        """Local vertices, ghosts included, of some groups; as `cells`."""
+        return self._entities(key, names, 0)
+
+    def nearest(self, key: Keys, points: Sequence[Sequence[float]]) -> Entities:
+        """Local vertices nearest to some points. Collective.
+
+        Raises:
+            CaseError: A point has not as many coordinates as the mesh, or lies farther from all vertices than they from
+                each other.
+        """
+        found = [self._vertex((*key, i), point) for i, point in enumerate(points)]
+        return np.unique(np.concatenate(found)).astype(np.int32)
+
+    def _vertex(self, key: Keys, point: Sequence[float]) -> Entities:
+        mesh = self.tagged.mesh
+        gdim, comm = mesh.geometry.dim, mesh.comm
+        if len(point) != gdim:
+            raise refused(self.document, key, f"must have {gdim} coordinates, as the mesh has")
+        place = np.pad(np.asarray(point, dtype=float), (0, 3 - gdim))
+        away = np.linalg.norm(mesh.geometry.x - place, axis=1)
+        nearest_here = (away.min(initial=np.inf), mesh.geometry.x[away.argmin()] if len(away) else place)
+        distance, vertex = min(comm.allgather(nearest_here), key=lambda found: found[0])
+        cells = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local, dtype=np.int32)
+        size = comm.allreduce(mesh.h(mesh.topology.dim, cells).max(initial=0.0), MPI.MAX)
+        if distance > size:
+            where = ", ".join(f"{x:g}" for x in vertex[:gdim])
+            raise refused(self.document, key, f"no vertex of the mesh is near; the nearest is ({where})")
+        return locate_entities(mesh, 0, lambda x: np.linalg.norm(x - vertex[:, None], axis=0) < 1e-9 * size)
+
+    def state(self) -> State:
+        """Displacement that may jump across cracks and what is open. Collective."""
+        mesh, about = self.tagged.mesh, self.tables.mesh
+        element = ("Lagrange", about.degree, (mesh.geometry.dim,))
+        space = cracked_space(mesh, element, self.split) if self.split else fem.functionspace(mesh, element)
+        with refusing(self.document, "mesh"):
+            return State(space, axisymmetric=about.axisymmetric)
+
+    @property
+    def split(self) -> list[Entities]:
+        """Facets across which displacement and temperature may jump."""
+        tables = self.tables
+        found = [self.facets(("cracks", name, "facets"), crack.facets) for name, crack in tables.cracks.items()]
+        return found + ([self.facets(("mesh", "open"), tables.mesh.open)] if tables.mesh.open else [])
+
+
+def _meshed(tables: CaseTables, document: Document, comm: MPI.Comm) -> TaggedMesh:
+    mesh = tables.mesh
+    if mesh.geometry == LAMINATE:
+        sizes: dict[str, Any] = {name: int(size) if name in _COUNTS else size for name, size in mesh.set.items()}
+        return laminate(comm, {layer.name: layer.thickness for layer in tables.layers}, **sizes)
+    if mesh.dim is None:
+        raise refused(document, ("mesh", "dim"), "missing, must be given: 2 or 3, the dimension of mesh and space")
+    if mesh.file is not None:
+        return read_msh(mesh.file, comm, gdim=mesh.dim)
+    assert mesh.geometry is not None
+    own = {"dim": float(mesh.dim)} if "dim" in outline(mesh.geometry).parameters else {}
+    return read_geo(geometry(mesh.geometry), comm, {**own, **mesh.set}, gdim=mesh.dim)

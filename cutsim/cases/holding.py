@@ -1,0 +1,97 @@
+"""Supports and loads of a case."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cutsim.bodies.loads import Load, NodalForce, Pressure, Support, Traction
+from cutsim.cases import schema_parts as schema
+from cutsim.cases.domains import Domain, Entities
+from cutsim.cases.expressions import TimeValue, corners_of
+from cutsim.cases.keys import Keys
+from cutsim.cases.refusals import refusing
+from cutsim.cases.tools import function
+from cutsim.fields.state import State
+
+
+def supports(domain: Domain, state: State) -> list[Support]:
+    """Supports of a case, with a reaction by the name of each; those of all components as name_x and so on. Collective.
+
+    Raises:
+        CaseError: A group or vertex is missing, or a support refuses a parameter.
+    """
+    return [s for name, table in domain.tables.supports.items() for s in _supports(domain, state, name, table)]
+
+
+def _supports(domain: Domain, state: State, name: str, table: schema.Support) -> Iterator[Support]:
+    dim, entities = _held(domain, ("supports", name), table)
+    gdim, corners = state.mesh.geometry.dim, _corners(table.corners, table.value)
+    with refusing(domain.document, "supports", name):
+        if table.direction == "all":
+            for i in range(gdim):
+                label = f"{name}_{'xyz'[i]}"
+                yield Support(state, entities, i, table.value, name=label, dim=dim, corners=corners)
+            return
+        along = direction(table.direction, gdim)
+        yield Support(state, entities, along, table.value, name=name, dim=dim, corners=corners)
+
+
+def _held(domain: Domain, key: Keys, table: schema.Support) -> tuple[int, Entities]:
+    """Dimension and local entities that a support holds. Collective."""
+    tdim = domain.tagged.mesh.topology.dim
+    if table.points or table.vertices:
+        return 0, _vertices(domain, key, table)
+    if table.cells:
+        return tdim, domain.cells((*key, "cells"), table.cells)
+    return tdim - 1, domain.facets((*key, "facets"), table.facets)
+
+
+def _vertices(domain: Domain, key: Keys, table: schema.Support | schema.NodalForce) -> Entities:
+    if table.points:
+        return domain.nearest((*key, "points"), table.points)
+    return domain.vertices((*key, "vertices"), table.vertices)
+
+
+def loads(domain: Domain, state: State) -> list[Load]:
+    """Loads of a case. Collective.
+
+    Raises:
+        CaseError: A group is missing, or a load refuses a parameter.
+    """
+    return [_load(domain, state, name, table) for name, table in domain.tables.loads.items()]
+
+
+def _load(domain: Domain, state: State, name: str, table: schema.Load) -> Load:
+    key, corners, value = ("loads", name), _corners(table.corners, table.value), function(table.value)
+    if isinstance(table, schema.NodalForce):
+        vertices = _vertices(domain, key, table)
+        with refusing(domain.document, *key):
+            along = direction(table.direction, state.mesh.geometry.dim)
+            return NodalForce(state, vertices, along, value, name=name, corners=corners)
+    facets = domain.facets((*key, "facets"), table.facets)
+    with refusing(domain.document, *key):
+        if isinstance(table, schema.Pressure):
+            return Pressure(state, facets, value, name=name, corners=corners)
+        along, current = direction(table.direction, state.mesh.geometry.dim), table.current_area
+        return Traction(state, facets, along, value, name=name, corners=corners, current_area=current)
+
+
+def direction(given: str | Sequence[float], gdim: int) -> tuple[float, ...]:
+    """Unit vector of a direction, given as an axis such as "x" or "-y", or as a vector of any length.
+
+    Raises:
+        ValueError: The mesh has no such axis, or the vector has another dimension or no length.
+    """
+    if isinstance(given, str):
+        axes = "xyz"[:gdim]
+        if given[-1] not in axes:
+            raise ValueError(f"direction = {given!r} is not allowed: it must be one of {', '.join(axes)}")
+        return tuple((-1.0 if given[0] == "-" else 1.0) * np.eye(gdim)["xyz".index(given[-1])])
+    length = float(np.linalg.norm(given))
+    if len(given) != gdim or not length:
+        raise ValueError(f"direction = {list(given)} is not allowed: it must have {gdim} components, not all zero")
+    return tuple(float(c) / length for c in given)
+
+
+def _corners(given: Sequence[float], value: TimeValue) -> tuple[float, ...]:
+    return tuple(sorted({*given, *corners_of(value)}))

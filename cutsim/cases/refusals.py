@@ -1,0 +1,50 @@
+"""What is found to be wrong with a case while it is put together, said as what is wrong in its file."""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from cutsim.base.checks import Refused
+from cutsim.cases.document import CaseError, Document
+from cutsim.cases.keys import Keys
+from cutsim.cases.messages import refusal
+
+
+def refused(document: Document, keys: Keys, words: str, value: Any = None) -> CaseError:
+    """Error that names file, line and key of what is wrong.
+
+    Args:
+        document: The text of the case.
+        keys: The key.
+        words: What is allowed.
+        value: The value that is not.
+    """
+    return CaseError([document.problem(keys, words, value)])
+
+
+@contextmanager
+def refusing(document: Document, *keys: str | int) -> Iterator[None]:
+    """Say of what a constructor refuses within where the file has it.
+
+    Args:
+        document: The text of the case.
+        keys: Key of the table from which the arguments come.
+
+    Raises:
+        CaseError: In place of a ValueError.
+    """
+    try:
+        yield
+    except CaseError:
+        raise
+    except Refused as error:
+        raise CaseError([refusal(error, keys, _node(document, keys), document)]) from error
+    except ValueError as error:
+        raise refused(document, keys, str(error)) from error
+
+
+def _node(document: Document, keys: Keys) -> Any:
+    node: Any = document.tables
+    for key in keys:
+        node = node.get(key) if isinstance(node, Mapping) else None
+    return node

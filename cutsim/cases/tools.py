@@ -1,0 +1,110 @@
+"""Rigid tools of a case."""
+
+from collections.abc import Callable, Mapping
+from typing import Literal
+
+import numpy as np
+
+from cutsim.bodies.solid import Solid
+from cutsim.cases import schema_parts as schema
+from cutsim.cases.bodies import softest
+from cutsim.cases.domains import Domain
+from cutsim.cases.expressions import TimeValue, corners_of
+from cutsim.cases.keys import Keys
+from cutsim.cases.refusals import refusing
+from cutsim.fields.points import Surface
+from cutsim.fields.sizes import normal_size
+from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack import Crack
+from cutsim.tools.pointed import Pointed
+from cutsim.tools.rigid_tool import RigidTool
+from cutsim.tools.shapes import ToolPath
+from cutsim.tools.tool_contact import ToolContact
+from cutsim.tools.triangulated_tool import TriangulatedTool
+from cutsim.tools.triangulation import Triangulation
+
+
+def tools(
+    domain: Domain, solids: tuple[Solid, ...], cracks: Mapping[str, Crack], temperature: Temperature | None
+) -> dict[str, RigidTool]:
+    """Tools of a case by name. Collective.
+
+    Raises:
+        CaseError: A surface is unknown, or a tool refuses a parameter.
+    """
+    found: dict[str, RigidTool] = {}
+    for name, table in domain.tables.tools.items():
+        if isinstance(table, schema.SurfaceTool):
+            found[name] = _triangulated(domain, solids, name, table)
+        else:
+            found[name] = _shaped(domain, solids, name, table, cracks, temperature)
+    return found
+
+
+def _shaped(
+    domain: Domain,
+    solids: tuple[Solid, ...],
+    name: str,
+    table: schema.Tool,
+    cracks: Mapping[str, Crack],
+    temperature: Temperature | None,
+) -> ToolContact:
+    key, shape, state = ("tools", name), table.made, solids[0].state
+    surfaces = [_surface(domain, state, (*key, "surfaces"), surface, cracks) for surface in table.surfaces]
+    with refusing(domain.document, *key):
+        contact = table.contact or _contact(shape, solids, surfaces)
+        friction = table.friction
+        path = path_of(table)
+        return ToolContact(
+            state, shape, path, surfaces, contact=contact, friction=friction, temperature=temperature, name=name
+        )
+
+
+def _triangulated(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.SurfaceTool) -> TriangulatedTool:
+    key, state = ("tools", name), solids[0].state
+    facets = domain.facets((*key, "surfaces"), table.surfaces)
+    with refusing(domain.document, *key):
+        surface = Triangulation.read(table.file, table.scale, comm=state.mesh.comm)
+        contact = table.contact or _contact(None, solids, [Surface.exterior(state, facets)])
+        path = path_of(table)
+        return TriangulatedTool(
+            state, facets, surface, path, contact=contact, friction=table.friction, search=table.search, name=name
+        )
+
+
+def _surface(domain: Domain, state: State, key: Keys, name: str, cracks: Mapping[str, Crack]) -> Surface:
+    """A group of outer facets, or a face of a crack by its name with + or −."""
+    crack, face = cracks.get(name[:-1]), name[-1]
+    if crack is not None and face in "+-":
+        side: Literal["+", "-"] = "+" if face == "+" else "-"
+        return crack.surface(side)
+    facets = domain.facets(key, [name])
+    with refusing(domain.document, *key):
+        return Surface.exterior(state, facets)
+
+
+def _contact(shape: object, solids: tuple[Solid, ...], surfaces: list[Surface]) -> PenaltyContact:
+    """Contact law of a tool that is given none: that of its kind, or a penalty of 10 E/h. Collective."""
+    points = [surface.points for surface in surfaces]
+    young = min(softest(solids, p.facets) for p in points)
+    h = min(p.mean(normal_size(solids[0].state.mesh, p.facets)) for p in points)
+    return shape.contact(young, h) if isinstance(shape, Pointed) else PenaltyContact.automatic(young, h)
+
+
+def path_of(table: schema.Tool) -> ToolPath:
+    """Motion of the reference point of a tool."""
+    path = table.path
+    if isinstance(path, schema.Polyline):
+        return ToolPath.polyline(path.times, path.points)
+    if isinstance(path, schema.Saw):
+        return ToolPath.saw(path.start, path.velocity, path.stroke, path.period)
+    position = [function(value) for value in table.position or ()]
+    corners = {corner for value in table.position or () for corner in corners_of(value)}
+    return ToolPath(lambda t: np.array([f(t) for f in position]), tuple(sorted(corners | set(table.corners))))
+
+
+def function(value: TimeValue) -> Callable[[float], float]:
+    """A function of time for what is one, or a number."""
+    return value if callable(value) else lambda _: value

@@ -1,0 +1,110 @@
+"""Built-in cases: each is read and begins to run; two give the numbers of the same problem in Python."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from cutsim import (
+    Blade,
+    Crack,
+    Drive,
+    Exponential,
+    Insertion,
+    LinearElastic,
+    Mechanics,
+    NeoHookean,
+    PenaltyContact,
+    Solid,
+    State,
+    StepControl,
+    Support,
+    cracked_block,
+    cracked_space,
+    geometry,
+    read_geo,
+    run,
+)
+from cutsim.cases import CaseError, built_in_cases, read_case
+
+COMM = MPI.COMM_WORLD
+CASES = {name: path for name, (_, path) in built_in_cases().items()}
+
+
+class Enough(Exception):
+    """The run has made as many steps as were wanted."""
+
+
+def steps(run, number):
+    """Reports of the first steps of a run."""
+    reports = []
+
+    def record(report):
+        reports.append(report)
+        if len(reports) == number:
+            raise Enough
+
+    with pytest.raises(Enough):
+        run(record)
+    return reports
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_built_in_case_begins_to_run(name):
+    simulation = read_case(CASES[name], quick=True).build(COMM)
+    last = steps(simulation.run, 2)[-1]
+    row = last.columns | simulation.columns(last.columns) | {"time": (last.time, "time")}
+    assert set(simulation.curve) <= set(row)
+    assert abs(row["energy_closure"][0]) < 0.1
+    assert all(np.isfinite(value) for value, _ in row.values())
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_parameter_has_a_comment(name):
+    text = CASES[name].read_text(encoding="utf-8")
+    assert text.startswith("# ")
+    parameters = text.partition("\n[parameters]\n")[2].partition("\n\n")[0]
+    assert all("#" in line for line in parameters.splitlines() if " = " in line)
+
+
+def test_the_beam_is_that_of_python():
+    reports = steps(read_case(CASES["dcb"], quick=True).build(COMM).run, 8)
+    sizes = dict(L=55, h=1.5, a0=30, fine=20, back=5, lc=0.5, lc_arm=1.0, ny=2, growth=1.05)
+    domain = read_geo(geometry("dcb"), COMM, sizes, gdim=2)
+    bonded = domain.facets("crack")
+    state = State(cracked_space(domain.mesh, ("Lagrange", 2, (2,)), [bonded, domain.facets("precrack")]))
+    steel, bond = LinearElastic(young=200e3, poisson=0.3), Exponential(strength=57.0, toughness=0.28)
+    soft = PenaltyContact.automatic(steel.young, 0.5, factor=1.0)
+    lower = domain.cells("lower")
+    crack = Crack(state, bonded, lower, bond, young=steel.young, contact=soft, normal="reference")
+    ends = [
+        Support(state, domain.facets(f"load_{side}"), 1, lambda t, sign=sign: sign * t / 2, name=side)
+        for side, sign in (("upper", 1), ("lower", -1))
+    ]
+    clamp = [Support(state, domain.facets("end"), axis) for axis in (0, 1)]
+    mechanics = Mechanics(state, [Solid(state, steel), crack], [*ends, *clamp])
+    control = StepControl(first=0.02, largest=0.02, line_searches=("basic", "l2", "bt"))
+    same = steps(lambda record: run(mechanics, 2.4, control, record), 8)
+    for name in ("upper_force", "energy_strain", "crack_damage_max"):
+        mine, theirs = ([report.columns[name][0] for report in of] for of in (reports, same))
+        assert mine == pytest.approx(theirs, rel=1e-9), name
+
+
+def test_the_cut_is_that_of_python():
+    simulation = read_case(CASES["steady-cut"], {"insertion.depth": "1.0"}, quick=True).build(COMM)
+    forces = []
+    simulation.run(lambda report: forces.append(simulation.columns(report.columns)["force"][0]))
+    sizes = dict(dim=2, Lx=1.0, H=6.5, notch=0.5, lc=0.2, band=0.3, growth=1.6)
+    domain = read_geo(geometry("block"), COMM, sizes, gdim=2)
+    block = cracked_block(domain, NeoHookean(0.777, 0.45), Exponential(strength=0.3, toughness=0.1), viscosity=2e-4)
+    blade = Blade(np.radians(20), 0.2, 0.5)
+    cut = Insertion.build(block, blade, Drive(speed=1.0, entry_time=1.0), notch=0.5)
+    same = []
+    control = StepControl(first=0.02, largest=0.05)
+    run(cut.mechanics, cut.time_of(1.0), control, lambda report: same.append(cut.columns(report.columns)["force"][0]))
+    assert max(forces) > 0.01
+    assert forces == pytest.approx(same, rel=1e-8, abs=1e-12)
+
+
+def test_a_group_that_the_mesh_lacks_is_named():
+    with pytest.raises(CaseError, match=r"dcb.toml:\d+: .*'load_uper'.*did you mean 'load_upper'"):
+        read_case(CASES["dcb"], {"supports.upper.facets": "load_uper"}).build(COMM)
