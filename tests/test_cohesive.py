@@ -8,9 +8,10 @@ import pytest
 
 from cutsim.interface.cohesive import Bilinear, Exponential, process_zone_element
 from cutsim.interface.dissipation import Way, losses
+from helpers.examples import LAWS
 from helpers.laws import BILINEAR, EXPONENTIAL, PPR, PROPORTIONAL, TRAPEZOIDAL
 
-LAWS = [EXPONENTIAL, BILINEAR, PROPORTIONAL, PPR, TRAPEZOIDAL]
+each = pytest.mark.parametrize("law", [bond.law for bond in LAWS.values()], ids=LAWS)
 
 PAIRS = [
     {"strength": 2.0, "opening": 0.1},
@@ -141,7 +142,7 @@ def test_damage_of_the_bilinear_law_is_its_loss_of_stiffness():
     assert [float(D) for D in BILINEAR.damage(0.6 * 200.0, 0.3 * 200.0)] == pytest.approx([0.4, 0.7])
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+@each
 def test_secants_fall_and_damage_grows(law):
     """In both jumps; from zero where the bond is intact to one where nothing is left of it."""
     jumps = np.linspace(0, 1, 201) * 60 * law.opening
@@ -151,6 +152,13 @@ def test_secants_fall_and_damage_grows(law):
         assert (np.diff(secant, axis=1) <= 1e-12 * secant[0, 0]).all()
         assert (secant >= 0).all() and D[0, 0] == pytest.approx(0, abs=1e-12) and D.min() >= -1e-12
         assert D[-1, 0] == pytest.approx(1) and D[0, -1] == pytest.approx(1)
+
+
+@each
+def test_the_strength_is_the_largest_traction(law):
+    opening = np.linspace(0, 8, 80_001) * law.opening
+    traction = law.secants(opening, 0 * opening)[0] * opening
+    assert traction.max() == pytest.approx(law.strength, rel=1e-3)
 
 
 def memory_along(law, jumps):
@@ -176,7 +184,7 @@ def stored(law, jumps):
     return 0.5 * memory_along(law, jumps)[-1] @ (max(jumps[-1, 0], 0.0) ** 2, jumps[-1, 1:] @ jumps[-1, 1:])
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+@each
 @pytest.mark.parametrize("mode", [0, 1], ids=["opening", "sliding"])
 @pytest.mark.parametrize("size", [540.0, 1e5])
 def test_a_jump_of_any_size_spends_the_toughness(law, mode, size):
@@ -200,7 +208,7 @@ def test_no_kink_is_missed_wherever_it_lies_in_a_step():
     np.testing.assert_allclose(lost, work - stored, atol=1e-7 * law.toughness)
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+@each
 @pytest.mark.parametrize("seed", range(6))
 def test_no_path_gives_energy_back(law, seed):
     """24 random legs: no leg gains, a step a leg is as good as 40, and work = stored + lost."""
@@ -216,7 +224,7 @@ def test_no_path_gives_energy_back(law, seed):
     assert power.sum() == pytest.approx(lost.sum() + stored(law, legs), rel=2e-5)
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+@each
 def test_a_closed_cycle_below_the_history_costs_nothing(law):
     """Open, close, and then shear, open, unshear, close, again and again, in either sense."""
     n, t = law.opening, 1.19 * law.opening

@@ -30,7 +30,8 @@ from cutsim.identify.indentation import _layer_factor
 from cutsim.identify.response import HomogeneousResponse
 from cutsim.materials.fibres import DispersedFibres, Reinforced
 from cutsim.materials.library import material
-from helpers.materials import ISOTROPIC, PATHS, energy, incompressible, name, nominal
+from helpers.examples import ISOTROPIC
+from helpers.materials import PATHS, energy, incompressible, name, nominal
 from helpers.pages import run_page
 
 # -- numbers of a law -------------------------------------------------------------------------------------------------

@@ -18,15 +18,10 @@ from cutsim.materials.elastic import LinearElastic, NeoHookean, StVenantKirchhof
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
 from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
 from helpers.blocks import make_blocks
+from helpers.examples import ANISOTROPIC, AXIS, ISOTROPIC, MATERIALS, MOONEY, TWO_CONSTANTS
 from helpers.laws import NU, E
 from helpers.materials import (
-    ANISOTROPIC,
-    AXIS,
     F0,
-    ISOTROPIC,
-    MATERIALS,
-    MOONEY,
-    TWO_CONSTANTS,
     assert_free_of_energy_and_stress,
     assert_hooke,
     assert_objective,

@@ -22,9 +22,10 @@ from cutsim.materials.rubbers import Ogden, Yeoh
 from cutsim.materials.viscoelastic import Prony
 from cutsim.results.output import interpolate
 from helpers.blocks import make_blocks
+from helpers.examples import AXIS, MOONEY
 from helpers.fields import smooth
 from helpers.laws import NU, E
-from helpers.materials import AXIS, MOONEY, energy, name, stress
+from helpers.materials import energy, name, stress
 from helpers.runs import history
 from helpers.tangents import assert_slope_two, slopes
 

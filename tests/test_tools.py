@@ -7,6 +7,7 @@ import pytest
 
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Plane, ToolPath
+from helpers.examples import TOOLS
 from helpers.tools import values
 
 HALF, R, SHANK = 0.4, 0.3, 0.9  # half angle, tip radius, half thickness of the blade
@@ -105,6 +106,28 @@ def test_distance_and_gradient_are_continuous(name):
         assert (np.abs(np.diff(distance)) <= step + 1e-9)[together].all()
         turn = np.linalg.norm(np.diff(gradient, axis=0), axis=1)
         assert (turn <= step / (0.2 * 0.5) + 1e-6)[together].all()
+
+
+@pytest.mark.parametrize("name", TOOLS)
+def test_distance_leads_to_the_surface(name):
+    """A point moved back by its distance along the gradient lies on the surface, no more curved than it says."""
+    shape, place = TOOLS[name]
+    rng, axes = np.random.default_rng(2), len(place)
+    body = rng.uniform([0] * (axes - 1) + [0.6], 1, (80, axes))
+    distance, gradient = values(shape, body - place)
+    assert (distance < 0).any() and (distance > 0).any(), "the tool dips into the body from above"
+    assert (values(shape, body[:5] * ([1] * (axes - 1) + [0]) - place)[0] > 0).all(), "and does not reach its base"
+    near = distance > -0.5 * shape.resolution
+    points, distance, gradient = (body - place)[near], distance[near], gradient[near]
+    np.testing.assert_allclose(np.linalg.norm(gradient, axis=1), 1, atol=1e-10)
+    level, normal = values(shape, points - distance[:, None] * gradient)
+    np.testing.assert_allclose(level, 0, atol=1e-6)
+    np.testing.assert_allclose(normal, gradient, atol=1e-5)
+    step = 1e-3 * rng.uniform(-1, 1, points.shape)
+    beside, turned = values(shape, points + step)
+    size = np.linalg.norm(step, axis=1)
+    assert (np.abs(beside - distance) <= size + 1e-9).all()
+    assert (np.linalg.norm(turned - gradient, axis=1) <= 2.1 * size / shape.resolution + 1e-6).all()
 
 
 @pytest.mark.parametrize(

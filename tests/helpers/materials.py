@@ -15,33 +15,7 @@ from cutsim.base.parameters import with_constants
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.state import State
-from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
-from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
-from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
-from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
 from helpers.fields import rotation
-from helpers.laws import NU, E
-
-MOONEY = MooneyRivlin(0.3, 0.1, 4.0)
-TWO_CONSTANTS = [kind(E, NU) for kind in (NeoHookean, StVenantKirchhoff, LinearElastic)]
-ISOTROPIC = [
-    *TWO_CONSTANTS,
-    IsochoricNeoHookean(E, NU),
-    MOONEY,
-    Yeoh(0.3, -0.05, 0.02, 4.0),
-    ArrudaBoyce(0.4, 8.0, 4.0),
-    Ogden((0.5, 0.3), (1.3, -2.0), 2.0),
-    IsochoricOgden((0.5, 0.3), (1.3, -2.0), 4.0),
-]
-AXIS = (0.6, 0.8, 0.0)
-ANISOTROPIC = [
-    TransverselyIsotropic(AXIS, 1.0, 0.3, 4.0, 0.2, 0.7),
-    FungOrthotropic(0.2, (3.0, 2.0, 1.5), (0.5, 0.4, 0.3), (1.0, 0.8, 0.9), 4.0, (AXIS, (-0.8, 0.6, 0.0))),
-    Reinforced(MOONEY, (ExponentialFibres(AXIS, 0.8, 0.5, 2.5),)),
-    Reinforced(NeoHookean(E, NU), (DispersedFibres(AXIS, 0.8, 0.5, 0.1), DispersedFibres((0.0, 0.6, 0.8), 0.8, 0.5))),
-    Reinforced(NeoHookean(E, NU), (EllipsoidalFibres((0.1, 0.2, 0.3), 2.5),)),
-]
-MATERIALS = [*ISOTROPIC, *ANISOTROPIC]
 
 
 def name(material):
