@@ -1,11 +1,35 @@
 """Case files: what is read, and what is said of what cannot be."""
 
 import math
+import pickle
+import random
+import re
 
+import dolfinx.jit
+import gmsh
 import pytest
 
-from cutsim import Blade, Exponential, NeoHookean, StepControl
-from cutsim.cases import CaseError, read_case
+from cutsim import (
+    AdiabaticTool,
+    Ball,
+    Blade,
+    Coulomb,
+    Exponential,
+    GeneralisedAlpha,
+    NeoHookean,
+    Ogden,
+    Prony,
+    StepControl,
+    ThermoElastic,
+)
+from cutsim.base.parameters import numbers
+from cutsim.base.units import Kind, Units
+from cutsim.cases import CaseError, check_groups, read_case
+from cutsim.cases.expressions import evaluate
+from cutsim.cases.quantities import Converter, split
+from cutsim.cases.schema_materials import in_units
+from cutsim.fields import meshing
+from cutsim.materials.library import LIBRARY
 
 BLADE = """
 title = "Blade cut of silicone"
@@ -39,6 +63,80 @@ notch = 0.5
 first = 0.02
 largest = 0.1
 """
+PEELED = """
+[units]
+length = "m"
+force = "kN"
+[mesh]
+file = "part.msh"
+scale = 0.001
+[material]
+library = "silicone 1"
+[bodies.upper]
+cells = "upper"
+relaxation = { strengths = [0.2], times = ["100 ms"] }
+density = "1100 kg/m^3"
+[bodies.lower]
+cells = ["lower", "lowest"]
+material = { model = "ogden", moduli = [1, "2 MPa"], exponents = [2, -2], volumetric = 3 }
+thermoelastic = { expansion = "1e-5 1/degC", reference = "20 degC" }
+density = 1.1
+[cracks.glue]
+facets = "glued"
+plus = "upper"
+law = { model = "exponential", strength = 0.15, toughness = 0.1 }
+friction = { model = "coulomb", mu = 0.1 }
+[cracks.cut]
+facets = "open"
+plus = [0, 1]
+law = "none"
+[pair]
+slave = "lower_top"
+master = "upper_bottom"
+friction = 0.2
+[tools.roller]
+shape = "ball"
+radius = "3 mm"
+surfaces = ["top", "glue+", "glue-"]
+path = { times = [0, "1 s", 3], points = [[0, 3.1], [0, 2.8], [5, 2.8]] }
+[tools.die]
+shape = "surface"
+file = "die.stl"
+surfaces = "bottom"
+position = ["0", "3 - t*tools.roller.radius"]
+[supports.pull]
+facets = "grip"
+direction = "y"
+value = "t/2"
+[supports.fix]
+points = [[0, 1]]
+direction = "all"
+[loads.press]
+kind = "pressure"
+facets = "top"
+value = { times = [0, "1 min"], values = ["0 Pa", "1 kPa"] }
+[heat]
+initial = "20 degC"
+[heat.bodies.upper]
+conductivity = "0.3 W/(m K)"
+capacity = "2000 J/(kg K)"
+[heat.bodies.lower]
+conductivity = [[1, 0], [0, 1]]
+capacity = 3
+[heat.boundary]
+kind = "convection"
+facets = "top"
+coefficient = "10 W/(m^2 K)"
+ambient = "300 + t"
+[heat.tools.roller]
+law = { model = "adiabatic-tool" }
+[analysis]
+type = "dynamic"
+scheme = { model = "generalised-alpha", rho_inf = 0.8 }
+until = 3
+[steps]
+fixed = 0.1
+"""
 
 
 @pytest.fixture
@@ -46,6 +144,8 @@ def written(tmp_path):
     """Write a case file."""
 
     def write(text, name="case.toml"):
+        for file in ("part.msh", "die.stl"):
+            (tmp_path / file).touch()
         path = tmp_path / name
         path.write_text(text, encoding="utf-8")
         return path
@@ -60,6 +160,9 @@ def refused(path, changes=None):
     return [problem.replace(f"{path.parent}/", "") for problem in error.value.problems]
 
 
+# ---- what is read
+
+
 def test_values_become_the_objects_of_cutsim(written):
     case = read_case(written(BLADE))
     assert case.material == NeoHookean(0.777, 0.48)
@@ -70,12 +173,228 @@ def test_values_become_the_objects_of_cutsim(written):
     assert case.bodies["body"].viscosity == 0.002
 
 
+def test_numbers_are_in_the_units_of_the_file(written):
+    """Everything in m, kN and s: stresses in kPa, masses in tonnes, powers in kW."""
+    path = written(PEELED)
+    case = read_case(path)
+    assert case.material == NeoHookean(777.0, 0.48)
+    upper, lower = case.bodies["upper"], case.bodies["lower"]
+    assert lower.material == Ogden((1.0, 2000.0), (2.0, -2.0), 3.0) and lower.cells == ("lower", "lowest")
+    assert upper.relaxation == Prony((0.2,), (0.1,)) and upper.density == pytest.approx(1.1)
+    assert lower.thermoelastic == ThermoElastic(1e-5, 293.15)
+    assert case.law_of(case.cracks["cut"]) is None and case.law_of(case.cracks["glue"]).strength == 0.15
+    assert case.cracks["glue"].friction == Coulomb(0.1) and case.pairs["pair"].friction == 0.2
+    assert case.tools["roller"].made == Ball(0.003) and case.tools["roller"].path.times == (0.0, 1.0, 3.0)
+    assert case.tools["die"].file == path.parent / "die.stl"
+    assert case.heat.bodies["upper"].conductivity == pytest.approx(3e-4)
+    assert case.heat.bodies["upper"].capacity == pytest.approx(2000.0)
+    assert case.heat.boundaries["boundary"].coefficient == pytest.approx(0.01)
+    assert case.heat.tools["roller"].law == AdiabaticTool()
+    assert case.analysis.scheme == GeneralisedAlpha(0.8)
+    assert case.steps == StepControl.fixed(0.1)
+
+
+def test_functions_of_time(written):
+    """They are values: equal if they are the same, and can be sent to other processes."""
+    case = read_case(written(PEELED))
+    pull, press, die = case.supports["pull"].value, case.loads["press"].value, case.tools["die"].position
+    assert pull(3) == 1.5 and press(30.0) == 0.5 and press(-1) == 0.0 and press(90) == 1.0
+    assert die[0] == 0.0 and die[1](2.0) == pytest.approx(3 - 2 * 0.003)
+    assert pickle.loads(pickle.dumps((pull, press, die))) == (pull, press, die)
+    with pytest.raises(ValueError, match=r"'1/t' cannot be evaluated \(float division by zero\) at t = 0"):
+        read_case(written(PEELED.replace('"t/2"', '"1/(1 + t)"'))).supports["pull"].value.__class__("1/t")(0)
+
+
+def test_a_file_extends_another(written):
+    written(BLADE, "base.toml")
+    path = written('extends = "base.toml"\n[tools.tool]\nfriction = 0.3\n[law]\nmodel = "bilinear"\npenalty = 100\n')
+    problems = refused(path)
+    assert problems[0] == "case.toml:4: law.strength: missing, must be given: Normal strength t_n [stress]."
+    path = written('extends = "base.toml"\n[tools.tool]\nfriction = 0.3\n[steps]\nlargest = 0.01\n')
+    assert refused(path) == ["case.toml:5: steps.largest: 0.01: must be a finite number >= first = 0.02"]
+    case = read_case(path, {"steps.largest": "edge", "mesh.set.lc": "0.1 mm", "tool.push": "[0, -2]"})
+    assert case.steps.largest == 0.2 and case.mesh.set["lc"] == 0.1 and case.tools["tool"].friction == 0.3
+    assert case.tools["tool"].made.push == (0, -1)
+    again = read_case(written(case.text, "whole.toml"))
+    assert dict(again) == dict(case)
+
+
+def test_files_that_extend_each_other_are_refused(written):
+    written('extends = "case.toml"\n', "base.toml")
+    path = written('title = "x"\nextends = "base.toml"\n')
+    assert refused(path)[0].startswith("base.toml:1: extends: 'case.toml': must be another file")
+    assert refused(written('extends = "none.toml"')) == [
+        "case.toml:1: extends: 'none.toml': must be a case file, relative to this one"
+    ]
+
+
+def test_settings_change_entries_of_lists(written):
+    path = written(PEELED)
+    case = read_case(path, {"tools.roller.path.points.1": '[0, "2 mm"]', "bodies.lower.material.moduli.0": "7"})
+    assert case.tools["roller"].path.points[1] == (0, 0.002)
+    assert case.bodies["lower"].material.moduli == (7, 2000)
+
+
+# ---- units and expressions
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "value"),
+    [
+        ("0.8 N/mm", "toughness", 0.8), ("15 deg", "angle", math.radians(15)), ("15°", "angle", math.radians(15)),
+        ("1e3 kg/m^3", "density", 1e-9), ("5 %", "one", 0.05), ("-3 cm", "length", -30),
+        ("20 degC", "temperature", 293.15),
+        ("2 MPa·s", "viscosity", 2), ("1 W/(m K)", "conductivity", 1), ("1 J/(kg K)", "specific heat", 1e6),
+        ("1e-4 1/degC", "expansion", 1e-4),
+    ],
+)  # fmt: skip
+def test_quantities(text, kind, value):
+    assert Converter(Units()).number(*split(text), Kind(kind)) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind"), [("1 deg", "one"), ("1 mm/m", "angle"), ("1 N", "length"), ("1 A", "one"), ("1 mmm", "length")]
+)
+def test_units_of_another_kind_are_refused(text, kind):
+    with pytest.raises(ValueError, match="is no unit"):
+        Converter(Units()).number(*split(text), Kind(kind))
+
+
+def test_expressions_run_no_python():
+    assert evaluate("2*sin(pi/6) + a.b**2", {"a.b": 3.0}) == pytest.approx(10.0)
+    for text in (
+        "__import__('os')",
+        "(1).real",
+        "[1][0]",
+        "9**9**9**9",
+        "'a'*3",
+        "lambda: 1",
+        "1 < 2",
+        "(-1)**0.5",
+        "f''",
+    ):
+        with pytest.raises(ValueError, match=r"cannot be evaluated|no expression|finite number"):
+            evaluate(text, {})
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("edge = 0.2", "angle*edge", "parameters.edge: 'angle*edge': must be a number, a quantity or an expression: "
+         "it refers to itself, edge -> edge"),
+        ('lc = "edge"', "angle*egde", "'egde' is neither a parameter nor a number of this file; did you mean 'edge'?"),
+        ("first = 0.02", "t", "it cannot depend on the time t"),
+        ("depth = 3.0", "mesh.geometry", "'block' is neither a parameter nor a number of this file"),
+        ("notch = 0.5", "1/0", "cannot be evaluated (float division by zero)"),
+    ],
+)  # fmt: skip
+def test_expressions_that_have_no_value(written, key, value, words):
+    wrong = BLADE.replace(key, f'{key.split(" ")[0]} = "{value}"')
+    assert any(problem.endswith(words) for problem in refused(written(wrong)))
+
+
+def test_a_material_in_other_units_is_the_same():
+    for record in LIBRARY.values():
+        there = in_units(record.material, Units(), Units("m", "N"))
+        back = numbers(in_units(there, Units("m", "N"), Units()))
+        assert there.young == pytest.approx(1e6 * record.material.young)
+        assert there.poisson == pytest.approx(record.material.poisson)
+        assert back == pytest.approx(numbers(record.material))
+
+
+# ---- what is refused
+
+
 def test_all_that_is_wrong_is_said_at_once(written):
     wrong = BLADE.replace("poisson = 0.48", "poison = 0.48").replace('"200 N/m"', '"200 N"').replace("= 0.02", "= 0.2")
-    assert refused(written(wrong)) == [
+    assert refused(written(wrong), {"output.every": "often"}) == [
         "case.toml:10: material.poisson: missing, must be given: Poisson's ratio, −1 < ν < ½ [–].",
         "case.toml:13: material.poison: unknown key, must be one of model, young, poisson; did you mean 'poisson'?",
         "case.toml:17: law.toughness: '200 N': must be a number [N/mm], a quantity such as '1 N/mm' or an expression: "
         "'N' is no unit of a toughness",
         "case.toml:31: steps.largest: 0.1: must be a finite number >= first = 0.2",
+        "--set output.every=often: output.every: 'often': must be a number or an expression: 'often' is neither a "
+        "parameter nor a number of this file",
     ]
+
+
+WRONG = {
+    'geometry = "block"': ('geometry = "blok"', "mesh.geometry: 'blok': .* the geometries .*; did you mean 'block'"),
+    "Lx = 4": ("lx = 4", "mesh.set.lx: 'lx': .* the parameters of the geometry .*; did you mean 'Lx'"),
+    'model = "exponential"': ('model = "exponentail"', "law.model: 'exponentail': .*; did you mean 'exponential'"),
+    "[body]": ("[bodi]", "bodi: unknown key, must be one of .*; did you mean 'bodies'"),
+    "angle = ": ("sin = ", "parameters.sin: .* must be a name of letters"),
+    'shape = "blade"': ('shape = "ball"\nradius = 1', "tool.half_angle: unknown key"),
+    "depth = 3.0": ("", "analysis.until: missing, must be given: the time at which the run ends, or depth in"),
+    "[insertion]": ('[cracks.glue]\nfacets = "crak"\nplus = true\n[insertion]', "'crak': .*; did you mean 'crack'"),
+    "[steps]": ("[crack]\nfacets = 'crack'\nplus = 'right'\n[steps]", "cracks: not allowed beside .insertion."),
+    '"0.002 MPa s"': ("0\nplane = 'strss'", "body.plane: 'strss': must be 'strain' or 'stress'; did you mean 'stress'"),
+    "[law]": ("[tools.tool]\n[law]", "tool: given twice, as tools.tool and as tool"),
+}
+
+
+@pytest.mark.parametrize("right", WRONG)
+def test_what_is_wrong_is_named_with_what_is_allowed(written, right):
+    wrong, words = WRONG[right]
+    problems = refused(written(BLADE.replace(right, wrong)))
+    assert any(re.match(rf"case\.toml:\d+: .*{words}", problem) for problem in problems), problems
+
+
+def test_groups_of_a_mesh_that_has_been_read(written):
+    path = written(PEELED)
+    names = "upper lower lowest glued open lower_top upper_bottom top bottom grip".split()
+    case = read_case(path)
+    check_groups(case, names)
+    with pytest.raises(CaseError, match=r"cracks.glue.facets: 'glued': .* groups .*'glue'"):
+        check_groups(case, [*names[:3], "glue", *names[4:]])
+
+
+VALUES = [
+    "3", "-1", "1e999", "nan", "true", '""', '"x"', "[]", "{}", "[[1]]", "{ a = 1 }", '"1 N"', '"1/0"', '"t"', '"2*"',
+    "1979-05-27", "9" * 400, '"9**9**9**9"', '"1 m^9^9^9^9"', '"1 mm^999999999"', '"exp(1e9)"', '"mesh.dim"',
+    '"((1"', '"\\u0000"',
+]  # fmt: skip
+
+
+def corrupted(data, chance):
+    """A file with a random fault: of its bytes, lines, keys, or values."""
+    lines, fault = data.split(b"\n"), chance.randrange(7)
+    at = chance.choice([i for i, line in enumerate(lines) if b"=" in line])
+    if fault == 0:
+        return data[: chance.randrange(len(data))]
+    if fault == 1:
+        return bytes(chance.randrange(256) for _ in range(chance.randint(1, 400)))
+    if fault == 2:
+        place = chance.randrange(len(data))
+        return data[:place] + bytes([chance.randrange(256)]) + data[place + 1 :]
+    if fault == 3:
+        del lines[chance.randrange(len(lines))]
+    if fault == 4:
+        place = chance.randrange(lines[at].index(b"="))
+        lines[at] = lines[at][:place] + chance.choice(b"abcxyz_.").to_bytes(1, "big") + lines[at][place + 1 :]
+    if fault >= 5:
+        lines[at] = lines[at].split(b"=")[0] + b"= " + chance.choice(VALUES).encode()
+    return b"\n".join(lines)
+
+
+def test_corrupted_files_are_refused_in_clear_words(written, monkeypatch):
+    """300 of them, in one line for each fault, with its place; nothing is meshed or compiled."""
+
+    def never(*args, **kwargs):
+        raise AssertionError("nothing is to be meshed or compiled")
+
+    monkeypatch.setattr(gmsh, "initialize", never)
+    monkeypatch.setattr(dolfinx.jit, "ffcx_jit", never)
+    monkeypatch.setattr(meshing, "create_mesh", never)
+    sources = [written(text).read_bytes() for text in (BLADE, PEELED)]
+    path, chance, refusals = written(BLADE), random.Random(0), 0
+    while refusals < 300:
+        path.write_bytes(corrupted(chance.choice(sources), chance))
+        try:
+            read_case(path)
+        except CaseError as error:
+            refusals += 1
+            assert error.problems
+            for problem in error.problems:
+                assert re.fullmatch(rf"{re.escape(str(path))}:\d+: .*\w.*", problem)
+                assert not re.search(r"pydantic|[Ii]nput|validat|function-|None|<\w+>:", problem), problem

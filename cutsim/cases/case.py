@@ -22,8 +22,7 @@ class Case(CaseTables):
     @property
     def text(self) -> str:
         """The case as one file: with what it extends, and with all changes."""
-        tables = {key: value for key, value in self._document.tables.items() if key != "extends"}
-        return tomlkit.dumps(tables)
+        return tomlkit.dumps(self._document.tables)
 
     def build(self, comm: MPI.Comm) -> Simulation:
         """Put the case together: mesh it and compile its forms. Collective.

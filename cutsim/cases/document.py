@@ -127,7 +127,9 @@ class Document:
 
     def changed(self, other: "Document") -> "Document":
         """This document with the tables of another one, which wins."""
-        return Document(_merged(self.tables, other.tables), {**self.origins, **other.origins})
+        tables = _merged(self.tables, other.tables)
+        left = set(_paths(tables))
+        return Document(tables, {k: origin for k, origin in {**self.origins, **other.origins}.items() if k in left})
 
 
 def _short(value: Any) -> str:
@@ -225,6 +227,7 @@ def load(path: Path, within: tuple[Path, ...] = ()) -> Document:
         raise CaseError([document.problem(("extends",), "must be another file than those that extend it", base)])
     if not target.is_file():
         raise CaseError([document.problem(("extends",), "must be a case file, relative to this one", base)])
+    del document.tables["extends"]
     return load(path.parent / base, chain).changed(document)
 
 

@@ -33,6 +33,14 @@ class _Evaluator(SimpleEval):
     def __init__(self, names: Mapping[str, Any]) -> None:
         super().__init__(functions=dict(FUNCTIONS), names=dict(names))
         self.nodes[ast.Attribute] = lambda node: self.names[_dotted(node)]
+        self.nodes[ast.Constant] = _constant
+
+
+def _constant(node: ast.Constant) -> float:
+    """A number; whole ones would grow without end."""
+    if isinstance(node.value, bool) or not isinstance(node.value, int | float):
+        raise ValueError(f"{node.value!r} is no number")
+    return float(node.value)
 
 
 def _dotted(node: ast.expr) -> str:

@@ -32,5 +32,6 @@ def dotted(keys: Keys) -> str:
 
 def nearest(word: str, known: Iterable[str]) -> str:
     """The nearest spelling among known words as a question, empty if none is near."""
-    found = difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)
-    return f"; did you mean {found[0]!r}?" if found else ""
+    spellings = {name.lower(): name for name in known}
+    found = difflib.get_close_matches(word.lower(), spellings, n=1, cutoff=0.6)
+    return f"; did you mean {spellings[found[0]]!r}?" if found else ""

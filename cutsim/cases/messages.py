@@ -73,7 +73,7 @@ def refusal(refused: Refused, keys: Keys, node: Any, document: Document) -> str:
     if name.replace(".", "").isidentifier():
         keys = (*keys, *name.split("."))
         value = node.get(name, value) if isinstance(node, Mapping) else value
-        return document.problem(keys, f"must be {refused.allowed}", value)
+        return document.problem(keys, f"must be {refused.allowed.removesuffix(' or None')}", value)
     return document.problem(keys, f"{name} = {value!r} must be {refused.allowed}")
 
 

@@ -1,13 +1,13 @@
 """Numbers of a case file: plain ones, quantities, expressions, and functions of time."""
 
-import math
+import sys
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 from cutsim.base.units import Kind, Units
-from cutsim.cases.expressions import TIME, TimeExpression, TimeTable, TimeValue, evaluate, names_in
+from cutsim.cases.expressions import FUNCTIONS, TIME, TimeExpression, TimeTable, TimeValue, evaluate, names_in
 from cutsim.cases.keys import full, nearest
 from cutsim.cases.quantities import Converter, split
 
@@ -73,7 +73,7 @@ class Numbers:
             return self._table(value, kind)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise ValueError
-        if not math.isfinite(value) or abs(value) > 1e300:
+        if not abs(value) <= sys.float_info.max:
             raise ValueError("it is not finite")
         return float(value)
 
@@ -121,7 +121,7 @@ class Numbers:
             return self._found(raw, None, True)
         except ValueError as error:
             cause = str(error) or "it is no number"
-            raise ValueError(cause if "refers to itself" in cause else f"of {name!r}, {cause}") from None
+            raise ValueError(cause if "refers to itself" in cause else f"in {name!r}, {cause}") from None
 
     def _find(self, name: str) -> Any:
         parameters = self._tables.get("parameters")
@@ -136,7 +136,7 @@ class Numbers:
     def _names(self) -> list[str]:
         """Names that expressions may have."""
         parameters = self._tables.get("parameters")
-        return [*(parameters if isinstance(parameters, Mapping) else ()), *_scalars(self._tables)]
+        return [*(parameters if isinstance(parameters, Mapping) else ()), *FUNCTIONS, *_scalars(self._tables)]
 
 
 def _scalars(tables: Mapping[str, Any], prefix: str = "") -> Iterator[str]:

@@ -58,7 +58,10 @@ def _checked(document: Document, groups: Collection[str] | None = None) -> Case:
         case = Case.model_validate(document.tables, context=scope)
     except ValidationError as error:
         found += problems(error, document, scope)
-    found += [document.problem(keys, words, value) for keys, words, value in contradictions(scope.valid)]
+    fields = Case.model_fields.items()
+    absent = {k: f for k, f in fields if k not in document.tables and not f.is_required()}
+    valid = {k: f.get_default(call_default_factory=True) for k, f in absent.items()} | scope.valid
+    found += [document.problem(keys, words, value) for keys, words, value in contradictions(valid)]
     if found or case is None:
         raise CaseError(list(dict.fromkeys(found)))
     case._document = document

@@ -7,7 +7,7 @@ from pydantic import Field, Tag
 from cutsim.base.units import Conductance, Conductivity, Density, SpecificHeat, TemperatureValue, Time
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyName, CrackName, Groups, PairName, ToolName
-from cutsim.cases.tables import FORM, FromTable, Table, Varying
+from cutsim.cases.tables import FORM, FromTable, Table, Varying, chosen_by
 from cutsim.heat.contact_heat import ContactHeat, HeatLaw
 
 Warmth = Annotated[TimeValue, Varying("temperature")]
@@ -78,7 +78,11 @@ class PrescribedTemperature(Table):
     corners: tuple[Time, ...] = ()
 
 
-HeatBoundary = Annotated[Flux | Convection | PrescribedTemperature, Field(discriminator="kind")]
+HeatBoundary = Annotated[
+    Flux | Convection | PrescribedTemperature,
+    Field(discriminator="kind"),
+    chosen_by("kind", ["flux", "convection", "temperature"]),
+]
 
 
 class HeatTool(Table):

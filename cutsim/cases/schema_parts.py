@@ -8,7 +8,7 @@ from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, V
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
-from cutsim.cases.tables import FORM, Constructed, Flag, FromTable, Table, Varying, With
+from cutsim.cases.tables import FORM, Constructed, Flag, FromTable, Table, Varying, With, chosen_by
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.tools.pointed import Pointed
@@ -312,4 +312,8 @@ class NodalForce(Table):
         return self
 
 
-Load = Annotated[Pressure | Traction | NodalForce, Field(discriminator="kind")]
+Load = Annotated[
+    Pressure | Traction | NodalForce,
+    Field(discriminator="kind"),
+    chosen_by("kind", ["pressure", "traction", "force"]),
+]

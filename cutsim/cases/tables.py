@@ -283,17 +283,27 @@ def one_of(key: str, tables: Sequence[type[Table]], names: Sequence[str]) -> Any
         tables: The tables.
         names: What each is called.
     """
+    several = annotated(reduce(or_, tables), Field(discriminator=key)) if len(tables) > 1 else tables[0]
+    return annotated(several, chosen_by(key, names))
+
+
+def chosen_by(key: str, names: Sequence[str]) -> BeforeValidator:
+    """Check that a table says by a key which of several it is.
+
+    Args:
+        key: The key.
+        names: What it may be.
+    """
 
     def check(value: Any) -> Any:
         if not isinstance(value, Mapping):
             raise ValueError("must be a table")
         if value.get(key) not in names:
-            given, near = value.get(key), nearest(str(value.get(key)), names)
-            raise Refused(key, given, f"one of {', '.join(map(repr, names))}{near}")
+            near = nearest(str(value.get(key)), names)
+            raise Refused(key, value.get(key), f"one of {', '.join(map(repr, names))}{near}")
         return value
 
-    several = annotated(reduce(or_, tables), Field(discriminator=key)) if len(tables) > 1 else tables[0]
-    return annotated(several, BeforeValidator(check))
+    return BeforeValidator(check)
 
 
 @cache

@@ -85,7 +85,8 @@ def strength_and_opening(
         return strength, toughness / (factor * strength)
     if toughness is not None and opening is not None:
         return toughness / (factor * opening), opening
-    raise ValueError(f"give two of {mode}strength, {mode}opening and {mode}toughness; got {given}")
+    have = ", ".join(f"{mode}{name} = {value:g}" for name, value in given.items() if value is not None) or "none"
+    raise ValueError(f"give two of {mode}strength, {mode}opening and {mode}toughness; got {have}")
 
 
 @checked
