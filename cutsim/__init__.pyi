@@ -15,7 +15,7 @@ from .fields.laminate import laminate as laminate
 from .fields.meshing import TaggedMesh as TaggedMesh
 from .fields.meshing import geometry as geometry
 from .fields.meshing import read_geo as read_geo
-from .fields.meshing import read_msh as read_msh
+from .fields.meshing import read_mesh as read_mesh
 from .fields.meshing import tag_mesh as tag_mesh
 from .fields.points import Surface as Surface
 from .fields.space import cracked_space as cracked_space

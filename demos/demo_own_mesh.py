@@ -1,7 +1,7 @@
 # # A mesh of your own: peeling a T
 #
 # Two soft strips are glued to each other, and their ends stand up like the arms of a T.  Grips pull the arms apart, and
-# the strips peel off each other.  The mesh is drawn here with gmsh.  A file from elsewhere will do as well: `read_msh`
+# the strips peel off each other.  The mesh is drawn here with gmsh.  A file from elsewhere will do as well: `read_mesh`
 # reads `.msh`, `.med`, `.unv` and `.cgns`.
 #
 # ## What theory says
@@ -62,9 +62,9 @@ comm.barrier()
 # All ranks read the file; `domain.names` then lists the groups that it has.  On the cracked space the nodes of both
 # lines have a displacement for each strip.  Triangles need the degree 2, because rubber hardly changes its volume.
 
-from cutsim import State, cracked_space, read_msh
+from cutsim import State, cracked_space, read_mesh
 
-domain = read_msh(folder / "peel.msh", comm, gdim=2)
+domain = read_mesh(folder / "peel.msh", comm, gdim=2)
 glued = domain.facets("glued")
 state = State(cracked_space(domain.mesh, ("Lagrange", 2, (2,)), [glued, domain.facets("cut")]))
 

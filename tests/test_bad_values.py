@@ -168,7 +168,7 @@ EXAMPLES: dict[str, Callable[[], dict[str, Any]]] = {
     "laminate": good(comm="@comm", layers={"skin": 1.0}, length=1.0, size=0.25, band=0.5, notch=0.25, width=1.0),
     "piecewise_direction": lambda: {"mesh": world()["mesh"], "regions": {FIBRE: world()["plus"]}},
     "read_geo": good(path="block.geo", comm="@comm", gdim=2),
-    "read_msh": good(path="block.msh", comm="@comm", gdim=2),
+    "read_mesh": good(path="block.msh", comm="@comm", gdim=2),
     "run": good(problem="@mechanics", until=1.0, control=cutsim.StepControl.fixed(1.0)),
     "tag_mesh": lambda: {"mesh": world()["mesh"], "cells": {}, "facets": {}},
 }  # fmt: skip

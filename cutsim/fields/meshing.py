@@ -1,35 +1,38 @@
-"""Meshes with named regions, read from gmsh or tagged by markers."""
+"""Meshes with named regions, read from files or tagged by markers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import basix.ufl
-import gmsh
 import numpy as np
 from dolfinx.mesh import Mesh, MeshTags, entities_to_geometry, locate_entities, meshtags
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import box
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import create_mesh
 from cutsim.base.signatures import checked
-from cutsim.fields import gmsh_model
 from cutsim.fields.cells import check_cells
+from cutsim.readers import formats, gmsh_model
+from cutsim.readers.facets import rows_in
+from cutsim.readers.mesh_data import MeshData
+from cutsim.readers.model import Choice, Model, make_model
+from cutsim.readers.twins import Merge
 
 # The geometries that come with cutsim: inside the installed package, beside it in a checkout.
 _PACKAGE = Path(__file__).parents[1]
 _GEOMETRIES = next((path for path in (_PACKAGE / "meshes", _PACKAGE.parent / "meshes") if path.is_dir()), _PACKAGE)
 
-# the tag of an entity in no group; gmsh has none below one
+# the tag of an entity in no group
 _NONE = -1
 
 Marker = Callable[[NDArray[np.float64]], NDArray[np.bool_]]
-#: Dimension and tag of a group.
-Group = tuple[int, int]
+#: Dimension and name of a group.
+Group = tuple[int, str]
 
 
 @checked
@@ -40,18 +43,23 @@ class TaggedMesh:
     Attributes:
         mesh: The mesh; from the readers below always with shared-facet ghosts, without which a crack along
             the border of two ranks would not know both its sides.
-        cell_tags: Tags of the cells. A cell in several groups has the tag of the last of them.
+        cell_tags: Tags of the cells. A cell in several groups has the tag of the first of them.
         facet_tags: Tags of the facets, exterior and interior, likewise.
-        names: Name of each group -> (dimension, tag).
-        groups: Local entities, ghosts included, of each group by (dimension, tag): all of them, also where groups
+        tags: (dimension, name) of each group of cells or facets -> its tag.
+        groups: Local entities, ghosts included, of each group by (dimension, name): all of them, also where groups
             overlap.
     """
 
     mesh: Mesh
     cell_tags: MeshTags
     facet_tags: MeshTags
-    names: Mapping[str, Group]
+    tags: Mapping[Group, int]
     groups: Mapping[Group, NDArray[np.int32]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all groups; groups of cells, facets and vertices may have the same name."""
+        return tuple(dict.fromkeys(name for _, name in self.groups))
 
     def cells(self, name: str) -> NDArray[np.int32]:
         """Local indices, ghosts included, of the cells of a group.
@@ -88,15 +96,22 @@ class TaggedMesh:
             ValueError: There is a group of this name.
         """
         require("name", name, name not in self.names, "other than that of a group")
-        tag = 1 + max((tag for _, tag in self.names.values()), default=0)
-        return replace(self, names={**self.names, name: (dim, tag)}, groups={**self.groups, (dim, tag): entities})
+        return replace(self, groups={**self.groups, (dim, name): entities})
+
+    def vertices(self, name: str) -> NDArray[np.int32]:
+        """Local indices, ghosts included, of the vertices of a set of nodes, such as a single point.
+
+        Raises:
+            ValueError: If no group of vertices has this name.
+        """
+        return self._find(name, 0)
 
     def _find(self, name: str, dim: int) -> NDArray[np.int32]:
-        known = [key for key, (d, _) in self.names.items() if d == dim]
-        if name not in known:
-            kind = "cells" if dim == self.mesh.topology.dim else "facets"
-            raise ValueError(f"name = {name!r} is no group of {kind}; known: {', '.join(known) or 'none'}")
-        return self.groups[self.names[name]]
+        if (dim, name) not in self.groups:
+            kind = {0: "vertices", self.mesh.topology.dim: "cells"}.get(dim, "facets")
+            known = ", ".join(known for of, known in self.groups if of == dim)
+            raise ValueError(f"name = {name!r} is no group of {kind}; known: {known or 'none'}")
+        return self.groups[dim, name]
 
 
 @checked
@@ -133,29 +148,65 @@ def read_geo(
         gdim: Dimension of the mesh and of its space, 2 or 3.
 
     Raises:
-        ValueError: On all ranks, if a parameter is unknown, gmsh fails, or the groups are refused as by `read_msh`.
+        ValueError: On all ranks, if a parameter is unknown, gmsh fails, or the groups are refused as by `read_mesh`.
     """
-    return _read(path, comm, gdim, lambda: gmsh_model.generate(path, parameters or {}, gdim))
+
+    def load() -> MeshData:
+        with gmsh_model.session():
+            gmsh_model.generate(path, parameters or {}, gdim)
+            return gmsh_model.extract(gdim)
+
+    return _read(path, comm, Choice(gdim), load)
 
 
 @checked
-def read_msh(path: Path | str, comm: MPI.Comm, gdim: int = 3) -> TaggedMesh:
-    """Read a mesh with groups: .msh of any version, .med, .unv or .cgns. Collective.
+def read_mesh(
+    path: Path | str,
+    comm: MPI.Comm,
+    gdim: int = 3,
+    *,
+    scale: float = 1.0,
+    only: Sequence[str] | None = None,
+    merge: Merge = False,
+    tolerance: float | None = None,
+) -> TaggedMesh:
+    """Read a mesh with groups from a file of gmsh, Abaqus, FEBio, VTK or of another format by its ending. Collective.
 
-    Node numbers may have gaps, and groups may overlap. Of a flat mesh in the plane of x and z or of y and z these two
-    are the coordinates.
+    - *gmsh* (.msh of any version, .med, .unv, .cgns): physical groups; cells in none are left out.
+    - *Abaqus* and CalculiX (.inp): sets of elements are groups of cells, surfaces are groups of facets. Those of a part
+      instance are called ``Instance.Set``, all its elements ``Instance``.
+    - *FEBio* (.feb, versions 2.0 to 4.0): parts, lists of parts and sets of elements; surfaces.
+    - Whatever else meshio reads (.vtu, .vtk, .xdmf, .med, .exo, .bdf …): sets of cells and points, and integers on
+      cells, each value a group.
+
+    A set of nodes is a group of vertices and, unless a set of facets is called so, of the facets that have all their
+    corners in it, inner ones too: the nodes of a surface in a body give the facets of a crack. Facets between two parts
+    A and B of a mesh are a group ``A|B``; a cell belongs to the part of the first of its groups. Cells with nodes on
+    their edges only (Abaqus C3D20, FEBio hex20) become those of 27 or 9 nodes that have exactly their shape. Of a flat
+    mesh in the plane of x and z or of y and z these two are the coordinates.
 
     Args:
-        path: The file; its physical groups name the cells and facets, cells in no group are left out.
+        path: The file.
         comm: Communicator over which the mesh is distributed.
         gdim: Dimension of the mesh and of its space, 2 or 3.
+        scale: Factor of all coordinates, such as 1000 for a file in metres and a run in millimetres.
+        only: Names of the groups of cells that make the mesh; all if None. What only other elements have is left out.
+        merge: Which nodes that lie on each other become one: all (True), none (False), or those between pairs of groups
+            of cells. ``A|B`` are the facets where they were merged. Where they are not, ``A|B`` are those of A that
+            lie on B, and ``B|A`` those of B, such as for a `SurfacePair`.
+        tolerance: Distance below which nodes lie on each other [length]; a thousandth of the shortest edge if None.
 
     Raises:
-        ValueError: On all ranks, if gmsh cannot read the file, the cells are not of one type that can be used, are
-            folded or have no volume, a flat mesh is not in a plane of two axes, or facets of a group are none of the
-            mesh.
+        ValueError: On all ranks, with the line where the file has lines, if the file cannot be read, the cells are not
+            of one type that can be used, are folded or have no volume, a flat mesh is not in a plane of two axes, there
+            is no group of a name, or facets of a group are none of the mesh.
     """
-    return _read(path, comm, gdim, lambda: gmsh_model.open_mesh(path))
+    require_number("scale", scale, positive)
+    require_number("tolerance", tolerance, positive.or_none)
+    require("only", only, only is None or (len(only) > 0 and not isinstance(only, str)), "names of groups, or None")
+    pairs = isinstance(merge, bool) or all(len(pair) == 2 and not isinstance(pair, str) for pair in merge)
+    require("merge", merge, pairs, "True, False, or pairs of names of groups")
+    return _read(path, comm, Choice(gdim, scale, only, merge, tolerance), lambda: formats.load(path, gdim))
 
 
 @checked
@@ -169,51 +220,46 @@ def tag_mesh(mesh: Mesh, cells: Mapping[str, Marker], facets: Mapping[str, Marke
         facets: The same for facets, exterior or interior.
 
     Raises:
-        ValueError: On all ranks, if a group is empty, a name is used twice, or cells are folded or have no volume.
+        ValueError: On all ranks, if a group is empty, or cells are folded or have no volume.
     """
     check_cells(mesh)
     tdim = mesh.topology.dim
-    names: dict[str, Group] = {}
     groups: dict[Group, NDArray[np.int32]] = {}
     for dim, markers in ((tdim, cells), (tdim - 1, facets)):
-        if twice := names.keys() & markers.keys():
-            raise ValueError(f"names of cells and facets must differ, both have {sorted(twice)}")
         mesh.topology.create_entities(dim)
         mesh.topology.create_connectivity(dim, tdim)
-        for tag, (name, marker) in enumerate(markers.items(), start=1):
-            names[name] = dim, tag
-            groups[dim, tag] = locate_entities(mesh, dim, marker)
-            if mesh.comm.allreduce(len(groups[dim, tag])) == 0:
+        for name, marker in markers.items():
+            groups[dim, name] = locate_entities(mesh, dim, marker)
+            if mesh.comm.allreduce(len(groups[dim, name])) == 0:
                 raise ValueError(f"the marker of {name!r} finds no entity of dimension {dim}, at least one is needed")
-    return _tagged(mesh, names, groups)
+    return _tagged(mesh, groups)
 
 
-def _tagged(mesh: Mesh, names: Mapping[str, Group], groups: Mapping[Group, NDArray[np.int32]]) -> TaggedMesh:
+def _tagged(mesh: Mesh, groups: Mapping[Group, NDArray[np.int32]]) -> TaggedMesh:
     """A mesh with groups, and tags made of them."""
-    tags = []
+    found, numbers = [], dict[Group, int]()
     for dim in (mesh.topology.dim, mesh.topology.dim - 1):
         index_map = mesh.topology.index_map(dim)
         values = np.full(index_map.size_local + index_map.num_ghosts, _NONE, dtype=np.int32)
-        for (of, tag), entities in groups.items():
-            if of == dim:
-                values[entities] = tag
+        own = [group for group in groups if group[0] == dim]
+        numbers |= {group: tag for tag, group in enumerate(own, start=1)}
+        for group in reversed(own):
+            values[groups[group]] = numbers[group]
         tagged = np.flatnonzero(values != _NONE).astype(np.int32)
-        tags.append(meshtags(mesh, dim, tagged, values[tagged]))
-    return TaggedMesh(mesh, tags[0], tags[1], names, groups)
+        found.append(meshtags(mesh, dim, tagged, values[tagged]))
+    return TaggedMesh(mesh, found[0], found[1], numbers, groups)
 
 
-def _read(path: Path | str, comm: MPI.Comm, gdim: int, load: Callable[[], None]) -> TaggedMesh:
-    """Load a gmsh model on rank 0 and distribute it."""
-    require("gdim", gdim, gdim in (2, 3), "2 or 3")
-    if comm.bcast(gmsh.isInitialized()):
-        raise ValueError(f"path = {path}: a gmsh session is already open, end it by gmsh.finalize() first")
+def _read(path: Path | str, comm: MPI.Comm, choice: Choice, load: Callable[[], MeshData]) -> TaggedMesh:
+    """Load a file on rank 0 and distribute its mesh."""
+    require("gdim", choice.gdim, choice.gdim in (2, 3), "2 or 3")
     model, problem = None, None
     if comm.rank == 0:
         try:
-            with gmsh_model.session():
-                load()
-                model = gmsh_model.extract(gdim)
-        except Exception as error:  # gmsh raises nothing narrower
+            if not Path(path).is_file():
+                raise ValueError("no such file")
+            model = make_model(load(), choice)
+        except Exception as error:  # readers raise nothing narrower
             problem = str(error) or type(error).__name__
     problem = comm.bcast(problem)
     try:
@@ -224,35 +270,44 @@ def _read(path: Path | str, comm: MPI.Comm, gdim: int, load: Callable[[], None])
         raise ValueError(f"path = {path}: {error}") from None
 
 
-def _distributed(model: gmsh_model.Model | None, comm: MPI.Comm) -> TaggedMesh:
+def _distributed(model: Model | None, comm: MPI.Comm) -> TaggedMesh:
     """The mesh that rank 0 has, and its groups, on all ranks."""
     shape = None if model is None else (model.cell, model.degree, model.points.shape[1], model.cells.shape[1])
     cell, degree, gdim, nodes = comm.bcast(shape)
-    names, groups = comm.bcast(None if model is None else (model.names, model.groups))
+    groups = comm.bcast(None if model is None else model.groups)
     element = basix.ufl.element("Lagrange", cell, degree, basix.LagrangeVariant.equispaced, shape=(gdim,))
     cells = np.empty((0, nodes), dtype=np.int64) if model is None else model.cells
     mesh = create_mesh(comm, cells, np.empty((0, gdim)) if model is None else model.points, element)
     check_cells(mesh)
     tdim, original = mesh.topology.dim, mesh.topology.original_cell_index
-    mesh.topology.create_entities(tdim - 1)
-    local = {
-        (dim, tag): np.flatnonzero(np.isin(original, rows)).astype(np.int32) if dim == tdim else _facets(mesh, rows)
-        for (dim, tag), rows in groups.items()
-    }
-    return _tagged(mesh, names, local)
+    numbers = {dim: _corners(mesh, dim) for dim in (0, tdim - 1)}
+
+    def local(dim: int, rows: NDArray[np.int64]) -> NDArray[np.int32]:
+        if dim == tdim:
+            return np.flatnonzero(np.isin(original, rows)).astype(np.int32)
+        return _entities(numbers[dim], rows.reshape(-1, dim * 0 + numbers[dim].shape[1]))
+
+    return _tagged(mesh, {group: local(group[0], rows) for group, rows in groups.items()})
 
 
-def _facets(mesh: Mesh, corners: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Local facets with these corners, given in the numbers of the nodes as they were read."""
+def _corners(mesh: Mesh, dim: int) -> NDArray[np.int64]:
+    """Corners of all local vertices or facets, in the numbers of the nodes as they were read."""
     tdim = mesh.topology.dim
-    mesh.topology.create_connectivity(tdim - 1, tdim)
-    index_map = mesh.topology.index_map(tdim - 1)
-    facets = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
-    if not len(facets):  # entities_to_geometry of dolfinx 0.9 divides by their number
-        return facets
+    mesh.topology.create_entities(dim)
+    mesh.topology.create_connectivity(dim, tdim)
+    index_map = mesh.topology.index_map(dim)
+    entities = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
+    corners = (
+        {"triangle": 2, "quadrilateral": 2, "tetrahedron": 3, "hexahedron": 4}[mesh.topology.cell_name()] if dim else 1
+    )
+    if not len(entities):  # entities_to_geometry of dolfinx 0.9 divides by their number
+        return np.empty((0, corners), dtype=np.int64)
     # of curved facets the corners come before the other nodes
-    nodes = entities_to_geometry(mesh, tdim - 1, facets)[:, : corners.shape[1]]
-    here = mesh.geometry.input_global_indices[nodes]
+    return mesh.geometry.input_global_indices[entities_to_geometry(mesh, dim, entities)[:, :corners]]
+
+
+def _entities(here: NDArray[np.int64], wanted: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Which entities have some corners."""
     # rows are compared where all corners are among those wanted: few
-    near = np.isin(here, corners).all(axis=1)
-    return facets[near][gmsh_model.rows_in(np.sort(here[near], axis=1), np.sort(corners, axis=1))]
+    near = np.flatnonzero(np.isin(here, wanted).all(axis=1)).astype(np.int32)
+    return near[rows_in(np.sort(here[near], axis=1), np.sort(wanted, axis=1))]

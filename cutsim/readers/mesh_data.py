@@ -49,6 +49,7 @@ class MeshData:
             come first, are the parts of the mesh.
         facet_sets: Name → corners of the facets as rows of the points, an array for each number of corners.
         pairs: Name → names of the two sets of facets of a pair of surfaces, slave (primary) first.
+        advice: What to do where facets of a set are none of the mesh, for messages.
     """
 
     points: Floats
@@ -58,6 +59,7 @@ class MeshData:
     cell_sets: Mapping[str, Indices] = field(default_factory=dict)
     facet_sets: Mapping[str, tuple[Indices, ...]] = field(default_factory=dict)
     pairs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    advice: str = ""
 
 
 class Numbering:

@@ -115,7 +115,7 @@ def _held(
 def _facets(body: CrackedBody, parameter: str, names: Sequence[str]) -> Facets:
     """Facets of some groups, none without a name."""
     domain = body.domain
-    known = [name for name, (dim, _) in domain.names.items() if dim == domain.mesh.topology.dim - 1]
+    known = [name for dim, name in domain.groups if dim == domain.mesh.topology.dim - 1]
     require(parameter, names, set(names) <= set(known), f"groups of facets of the mesh: {', '.join(known)}")
     return np.concatenate([np.empty(0, dtype=np.int32), *(domain.facets(name) for name in names)])
 

@@ -1,11 +1,8 @@
 """Triangulations of real tools: closed surfaces of triangles or segments, from files or arrays (docs/theory.md §4)."""
 
-import contextlib
-import io
 from dataclasses import dataclass
 from pathlib import Path
 
-import meshio
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -16,6 +13,7 @@ from scipy.spatial import cKDTree
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
+from cutsim.readers.meshio_files import open_mesh
 
 logger = collective_logger(__name__)
 
@@ -97,15 +95,7 @@ class Triangulation:
 
 def _load(file: Path | str) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Nodes and facets of a file."""
-    words = io.StringIO()
-    try:
-        # meshio prints what is wrong and leaves the interpreter; it takes text for a large number first
-        with np.errstate(over="ignore"), contextlib.redirect_stdout(words), contextlib.redirect_stderr(words):
-            mesh = meshio.read(file)
-    except SystemExit:
-        raise ValueError(" ".join(words.getvalue().split())) from None
-    except Exception as error:  # readers raise whatever a broken file makes them
-        raise ValueError(str(error) or type(error).__name__) from error
+    mesh = open_mesh(file)
     kinds = sorted(mesh.cells_dict)
     dim = 3 if _KINDS[3] in kinds else 2
     require("cells", kinds, _KINDS[dim] in kinds and "quad" not in kinds, "triangles, or segments in 2-D")
