@@ -13,10 +13,7 @@ from cutsim.base.checks import place
 from cutsim.fields.pieces import mesh_pieces
 
 #: How nodes that lie on each other become one.
-MERGE = (
-    "merge them in gmsh before meshing (Coherence;, BooleanFragments, occ.fragment) or after it "
-    "(gmsh.model.mesh.removeDuplicateNodes())"
-)
+MERGE = "merge them when the mesh is read (merge=True) or in gmsh before meshing (Coherence;, BooleanFragments, occ.fragment)"
 # distance below which two nodes lie on each other, as a fraction of the size of the mesh
 _SAME = 1e-7
 
