@@ -17,7 +17,7 @@ from cutsim.cases.refusals import refused, refusing
 from cutsim.cases.schema import CaseTables
 from cutsim.cases.schema_mesh import Selection
 from cutsim.fields.laminate import laminate
-from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_msh
+from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_mesh
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
 
@@ -77,13 +77,13 @@ class Domain:
         return self._entities(key, names, self.tagged.mesh.topology.dim - 1)
 
     def _entities(self, key: Keys, names: Sequence[str], dim: int) -> Entities:
-        known = {name: group for name, group in self.tagged.names.items() if group[0] == dim}
+        known = [name for of, name in self.tagged.groups if of == dim]
         for name in names:
             if name not in known:
                 kind = _KINDS.get(self.tagged.mesh.topology.dim - dim, "vertices")
                 words = f"{name!r} is no group of {kind} of the mesh{nearest(name, known)}"
                 raise refused(self.document, key, f"{words}; it has {', '.join(known) or 'none'}")
-        parts = [self.tagged.groups[known[name]] for name in names]
+        parts = [self.tagged.groups[dim, name] for name in names]
         return np.unique(np.concatenate([np.empty(0, np.int32), *parts])).astype(np.int32)
 
     def _with(self, name: str, selection: Selection) -> TaggedMesh:
@@ -157,7 +157,7 @@ def _meshed(tables: CaseTables, document: Document, comm: MPI.Comm) -> TaggedMes
     if mesh.dim is None:
         raise refused(document, ("mesh", "dim"), "missing, must be given: 2 or 3, the dimension of mesh and space")
     if mesh.file is not None:
-        return read_msh(mesh.file, comm, gdim=mesh.dim)
+        return read_mesh(mesh.file, comm, gdim=mesh.dim, scale=mesh.scale, only=mesh.only or None)
     assert mesh.geometry is not None
     own = {"dim": float(mesh.dim)} if "dim" in outline(mesh.geometry).parameters else {}
     return read_geo(geometry(mesh.geometry), comm, {**own, **mesh.set}, gdim=mesh.dim)

@@ -13,7 +13,10 @@ from cutsim.base.checks import place
 from cutsim.fields.pieces import mesh_pieces
 
 #: How nodes that lie on each other become one.
-MERGE = "merge them when the mesh is read (merge=True) or in gmsh before meshing (Coherence;, BooleanFragments, occ.fragment)"
+MERGE = (
+    "merge them in gmsh before meshing (Coherence;, BooleanFragments, occ.fragment) or after it "
+    "(gmsh.model.mesh.removeDuplicateNodes()), or when the file is read (read_mesh with merge=True)"
+)
 # distance below which two nodes lie on each other, as a fraction of the size of the mesh
 _SAME = 1e-7
 
