@@ -48,8 +48,8 @@ def test_mpi_is_loaded_first(package):
     if package == "commands":  # starts without dolfinx, which its modules load by the other packages
         return
     uses_dolfinx = any("dolfinx" in path.read_text() for path in (SOURCES / package).glob("*.py"))
-    first = ast.parse((SOURCES / package / "__init__.py").read_text()).body[1:2]
-    assert not uses_dolfinx or [ast.unparse(node) for node in first] == ["import mpi4py.MPI"]
+    first = ast.parse((SOURCES / package / "__init__.py").read_text()).body[1:3]
+    assert not uses_dolfinx or "import mpi4py.MPI" in [ast.unparse(node) for node in first]
 
 
 def test_no_module_imports_itself_through_others():

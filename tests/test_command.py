@@ -18,7 +18,8 @@ from typer.testing import CliRunner
 
 import cutsim
 from cutsim.analysis.stepping import StepError
-from cutsim.commands import case_files, launch, new
+from cutsim.cases import built_in
+from cutsim.commands import launch, new
 from cutsim.commands.endings import Ending, endings
 from cutsim.commands.jobs import Job, Runner
 from cutsim.commands.main import COMMANDS, app
@@ -138,7 +139,7 @@ def library(tmp_path, monkeypatch):
     folder = tmp_path / "library"
     folder.mkdir()
     (folder / "cut.toml").write_text('title = "A cut"\n[law]\ntoughness = 0.8  # energy of new surface\n')
-    monkeypatch.setattr(case_files, "LIBRARY", folder)
+    monkeypatch.setattr(built_in, "FOLDER", folder)
     monkeypatch.chdir(tmp_path)
     return folder
 

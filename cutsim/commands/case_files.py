@@ -4,48 +4,11 @@ from __future__ import annotations
 
 import difflib
 import re
-import tomllib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
 import typer
-
-#: Folder of the built-in cases, which can be listed without loading `cutsim.cases`.
-LIBRARY = Path(str(resources.files("cutsim"))) / "cases" / "library"
-
-
-@dataclass(frozen=True)
-class BuiltIn:
-    """A case that comes with the program.
-
-    Args:
-        path: Its file.
-    """
-
-    path: Path
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-        return self.path.stem
-
-    @property
-    def title(self) -> str:
-        """What is simulated, in a few words."""
-        return str(tomllib.loads(self.text)["title"])
-
-    @property
-    def text(self) -> str:
-        """The file."""
-        return self.path.read_text(encoding="utf-8")
-
-
-def built_in() -> dict[str, BuiltIn]:
-    """The built-in cases by name."""
-    return {path.stem: BuiltIn(path) for path in sorted(LIBRARY.glob("*.toml"))}
 
 
 def case_path(case: str) -> Path:
@@ -59,9 +22,11 @@ def case_path(case: str) -> Path:
     """
     if Path(case).is_file():
         return Path(case)
-    known = built_in()
+    from cutsim.cases import built_in_cases
+
+    known = built_in_cases()
     if case in known:
-        return known[case].path
+        return known[case][1]
     near = difflib.get_close_matches(case, known, n=1)
     words = f"; did you mean {near[0]}?" if near else ""
     raise FileNotFoundError(f"{case} is neither a file nor a built-in case (cutsim cases lists those){words}")
@@ -102,8 +67,10 @@ def file_name(text: str) -> str:
 
 def complete(incomplete: str) -> list[str]:
     """Names of built-in cases and of case files that begin so, for the completion of the shell."""
+    from cutsim.cases import built_in_cases
+
     files = [str(path) for path in Path().glob(f"{incomplete}*.toml")]
-    return [name for name in (*built_in(), *files) if name.startswith(incomplete)]
+    return [name for name in (*built_in_cases(), *files) if name.startswith(incomplete)]
 
 
 CaseArgument = Annotated[

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cutsim.commands.case_files import built_in, case_path, complete
+from cutsim.commands.case_files import case_path, complete
 from cutsim.commands.options import Overwrite, console
 
 if TYPE_CHECKING:
@@ -48,7 +48,9 @@ def _choice() -> str:
         raise typer.BadParameter("without a terminal nothing is asked: name a built-in case", param_hint="--from")
     import questionary
 
-    choices = [questionary.Choice(f"{case.name}: {case.title}", case.name) for case in built_in().values()]
+    from cutsim.cases import built_in_cases
+
+    choices = [questionary.Choice(f"{name}: {title}", name) for name, (title, _) in built_in_cases().items()]
     return str(questionary.select("Which case is most like yours?", choices).unsafe_ask())
 
 

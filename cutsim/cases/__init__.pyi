@@ -1,0 +1,5 @@
+from .built_in import built_in_cases as built_in_cases
+from .case import Case as Case
+from .document import CaseError as CaseError
+from .reading import check_groups as check_groups
+from .reading import read_case as read_case
