@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from dataclasses import fields, replace
 from typing import get_args
 
 import numpy as np
@@ -11,11 +12,15 @@ from dolfinx import jit
 import cutsim
 import cutsim.identify
 from helpers.arguments import arguments, hints, kinds
+from helpers.examples import instances
 
 INF = float("inf")
 
 #: Made by others, not from numbers of a user.
 MADE = {"CrackedBody", "Insertion", "LayeredBlock", "StepReport"}
+#: What shows and keeps results, after all was computed.
+SHOWN = {"Checkpoints", "Curve", "Recording", "read_history"}
+SHOWN |= {"draw_body", "draw_insertion", "draw_stress", "plot_curves", "plot_energy", "plot_parts"}
 #: Where infinity says that there is no limit.
 ENDLESS = {("run", "until")}
 #: What takes files and curves, beside what is in `cutsim` itself.
@@ -32,7 +37,7 @@ def callables():
     for name in cutsim.__all__:
         item = getattr(cutsim, name)
         error = inspect.isclass(item) and issubclass(item, Exception)
-        if name not in MADE and not error and not getattr(item, "_is_protocol", False):
+        if name not in MADE | SHOWN and not error and not getattr(item, "_is_protocol", False):
             found[name] = item
         if inspect.isclass(item):
             methods = (n for c in item.__mro__ for n, m in vars(c).items() if isinstance(m, classmethod))
@@ -98,3 +103,18 @@ def test_bad_values_are_refused_by_name(name, parameter, monkeypatch):
         except Exception as error:
             wrong.append(f"{label}: {type(error).__name__}: {error}")
     assert not wrong, "\n".join(wrong)
+
+
+EXTREMES = [
+    (name, f.name)
+    for name, example in instances().items()
+    for f in fields(example)
+    if f.init and isinstance(getattr(example, f.name), float)
+]
+
+
+@pytest.mark.parametrize(("name", "parameter"), EXTREMES)
+def test_numbers_far_out_of_range_are_refused_by_name(name, parameter):
+    """No parameter of a law, tool, material or step control may be as low as −1000."""
+    with pytest.raises(ValueError, match=rf"^{parameter}\b.* is not allowed"):
+        replace(instances()[name], **{parameter: -1000.0})

@@ -1,6 +1,7 @@
 """Rejected steps leave no trace, failures are named, corners are met, and a signal ends a run after its step."""
 
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import ufl
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import Interrupted, StepControl, StepError, begin, run
+from cutsim.analysis.stepping import Interrupted, StepControl, StepError, StepReport, begin, run
 from cutsim.base.terms import Energetic, offering
 from cutsim.bodies.loads import Support, Traction
 from cutsim.fields.points import Surface
@@ -18,9 +19,11 @@ from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.results.output import read_history
 from cutsim.results.recording import Recording
+from cutsim.solvers.iterations import Outcome
 from cutsim.tools.shapes import Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact
 from helpers.blocks import make_blocks
+from helpers.examples import CONTROLS
 from helpers.laws import EXPONENTIAL, NU, E
 from helpers.runs import history
 
@@ -270,6 +273,18 @@ def test_signal_ends_the_run_after_its_step(number, tmp_path):
     np.testing.assert_allclose(rows["top_force"], record.history["top_force"], rtol=1e-6)
     mechanics.solve = solve
     assert run(mechanics, 0.2, StepControl.fixed(0.05)).time == 0.2, "and the run can go on"
+
+
+@pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS)
+def test_a_control_shortens_rejected_steps(control):
+    """From reports made by hand: a smaller step after every rejection, and a positive one after what it accepts."""
+    solved = Outcome(True, 2, "converged", 5, 5, (1.0, 1e-9))
+    for dt in np.geomspace(control.smallest, control.first, 9):
+        tried = StepReport(1, 1.0, float(dt), solved)
+        assert control.accept(tried) is None, "nothing speaks against it"
+        assert control.next(tried) > 0
+        for refusal in ("", "too large"):
+            assert 0 < control.next(replace(tried, refusal=refusal)) < dt
 
 
 @pytest.mark.parametrize(

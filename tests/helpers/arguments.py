@@ -48,7 +48,7 @@ def things():
         "pair": cutsim.SurfacePair(b.state, left, right, young=1.0), "path": path, "plus": b.lower,
         "points": surface.points, "scalars": scalars, "sides": sides, "slave_facets": left, "solid": solid,
         "state": b.state, "surface": surface, "temperature": temperature,
-        "tool": cutsim.ToolContact(b.state, cutsim.Ball(0.3), path, [surface], contact=contact),
+        "tags": laminated.tags, "tool": cutsim.ToolContact(b.state, cutsim.Ball(0.3), path, [surface], contact=contact),
         "triangle": cutsim.Triangulation(corners, sides), "vertices": np.arange(1, dtype=np.int32),
     }  # fmt: skip
 
@@ -72,7 +72,13 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Layer": {"name": "skin"},
     "LayeredBlock.build": {"layers": "@layers"},
     "Prony": {"strengths": (1.0,), "times": (1.0,)},
-    "TaggedMesh": {"mesh": "@mesh", "cell_tags": "@cell_tags", "facet_tags": "@facet_tags", "names": {}, "groups": {}},
+    "TaggedMesh": {
+        "mesh": "@mesh",
+        "cell_tags": "@cell_tags",
+        "facet_tags": "@facet_tags",
+        "tags": "@tags",
+        "groups": {},
+    },
     "Temperature": {"space": "@scalars"},
     "ToolHeat": {"tool_temperature": 1.0},
     "ToolPath.polyline": {"times": [0.0, 1.0], "points": [(0.0, 0.0), (0.0, 1.0)]},

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from cutsim.base.checks import positive, require_number
 from cutsim.base.functions import if_less, larger, positive_part, sqrt
 from cutsim.interface.cohesive import Bilinear, Exponential
 from cutsim.interface.ppr import ParkPaulinoRoesler
@@ -31,6 +32,10 @@ class Trapezoidal:
     rise: float = 0.1
     plateau: float = 0.25
     final: float = 0.4
+
+    def __post_init__(self):
+        for name, value in vars(self).items():
+            require_number(name, value, positive)
 
     @property
     def opening(self):
