@@ -14,7 +14,7 @@ SOURCES, TESTS = Path(cutsim.__file__).parent, Path(__file__).parent
 #: not help who calls. Each has the number that it may have, everything else at most 8.
 WIDE = {
     "pairs.surface_pair.SurfacePair.__init__": 13,
-    "results.pictures.draw_body": 13,
+    "results.pictures.draw_body": 15,
     "identify.inverse.fit_simulation": 11,
     "bodies.solid.Solid.__init__": 11,
     "commands.fit_material.command": 10,

@@ -1,30 +1,76 @@
-"""Pictures of a run: the deformed and cut body with the tool (pyvista, off screen).
+"""Pictures of a run: the deformed and cut body with its tools (pyvista, off screen, framed by matplotlib).
 
-Pictures are extras: where pyvista is missing or cannot draw, that is logged as a warning and the run goes on.
+Pictures are extras: where pyvista is missing or cannot draw, that is logged as a warning and the run goes on. A path
+that ends in ``.pdf`` or ``.svg`` gets text and bars as vectors and the body as an image of double resolution. With
+matplotlib's ``savefig.transparent`` the ground is transparent.
 """
 
 from __future__ import annotations
 
-import ctypes
 import logging
-import os
-import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
 from cutsim.results.grids import VonMises, gather_facets, gather_grid
+from cutsim.results.scene import DAMAGE, STRESS, Scene, View, corners, sharp_edges
+from cutsim.results.sheet import SCENE, SIZE, Bar, compose
+from cutsim.results.stages import Skin, Stage
 
 if TYPE_CHECKING:
     import pyvista
 
 logger = logging.getLogger(__name__)
+
+#: Colours of the parts of a body; more of them are told apart by a ramp.
+PARTS = ("#9ecae1", "#fdd0a2", "#c7e9c0", "#dadaeb", "#f7c6c7", "#e2d3b5", "#c2e5e5", "#e6e6a8")
+
+# from where a body in space is looked at: to the right, up, in front
+_ASIDE = np.array([1.0, 0.7, 1.6])
+# damage below which a crack counts as intact
+_INTACT = 1e-3
+# pixels per inch
+_FINE = 200
+
+
+@dataclass(frozen=True)
+class _Content:
+    """What a picture shows, all of it deformed."""
+
+    body: pyvista.PolyData
+    scalars: str
+    bar: Bar
+    lines: pyvista.DataSet
+    crack: pyvista.DataSet | None
+    tool: pyvista.PolyData | None
+    flat: bool
+    edges: bool = False
+
+    def figure(self, view: View, *, title: str, length: str, dpi: int) -> Figure:
+        """The picture."""
+        width, height = (round(dpi * inch) for inch in SIZE)
+        bars = [self.bar]
+        with Scene((width, round(SCENE * height)), flat=self.flat) as scene:
+            scene.add_body(self.body, self.scalars, self.bar.colours, self.bar.limits, edges=self.edges)
+            scene.add_lines(self.lines)
+            if self.crack is not None and self.crack.n_cells:
+                scene.add_crack(self.crack)
+                if self.crack["damage"].max() > _INTACT:
+                    bars.append(Bar("damage of the crack", DAMAGE, (0.0, 1.0)))
+            if self.tool is not None:
+                scene.add_tool(self.tool)
+            pixels, seen = scene.shot(view)
+        return compose(pixels, seen, bars, title=title, length=length)
 
 
 def draw_body(
@@ -42,27 +88,32 @@ def draw_body(
     up: Sequence[float] = (0.0, 1.0, 0.0),
     window: Sequence[float] | None = None,
     limits: tuple[float, float] | None = None,
+    names: Sequence[str] = (),
+    length: str = "mm",
 ) -> None:
     """Draw the deformed body coloured by a field. Call it on all ranks with what `gather_grid` gave them.
 
-    A flat grid is seen from the front without perspective.
+    There is no perspective, so that the scale holds all over the picture; a flat grid is seen from the front. The bar
+    of damage is left out where nothing is damaged.
 
     Args:
-        path: The PNG, 1600 × 1000; folders are made.
+        path: The PNG of 1600 × 1000 pixels, PDF or SVG; folders are made.
         grid: The body; where it is None nothing is drawn.
         scalars: Name of the cell field that colours the body; it is averaged to the nodes.
-        label: Text at the colour bar, with the unit.
+        label: Text at the colour bar, with the unit; mathematics of TeX is set.
         title: Text above the picture.
         tool: Rigid tool at its current place.
         crack: Crack facets from `gather_facets`, coloured by damage.
-        mirror: Planes of symmetry through the origin, by the axis normal to them ("x", "y", "z"): body and
-            crack are shown whole.
-        clip: Normal and a point of a plane; cells whose middle lies beyond it before deformation are left
-            out.
+        mirror: Planes of symmetry through the origin, by the axis normal to them ("x", "y", "z"): body and crack are
+            shown whole.
+        clip: Normal and a point of a plane; cells whose middle lies beyond it before deformation are left out.
         view: Direction from the body to the eye.
         up: Direction that points up in the picture.
         window: Box (xmin, xmax, ymin, ymax, zmin, zmax) that is to fill the picture; the body by default.
         limits: Range of the colours; by default the field without its most extreme percent at either end.
+        names: Names of the values 0, 1, … of a field that has these only, such as the number of a layer: they are told
+            apart by a legend in place of a bar.
+        length: Symbol of the unit of length, for the scale.
 
     Raises:
         ValueError: If a plane of symmetry is unknown.
@@ -75,27 +126,80 @@ def draw_body(
         require("scalars", scalars, scalars in grid.cell_data, f"one of {grid.cell_data.keys()}")
         flat = not np.ptp(grid.points[:, 2])
         body = _deformed(grid, mirror, clip)
-        plotter = _stage(title)
-        _add_body(plotter, body, scalars, label, limits or _range(body.cell_data[scalars]), flat)
-        _add_outline(plotter, body, mirror)
-        if crack is not None and crack.n_cells:
-            _add_crack(plotter, _deformed(crack, mirror, clip), flat)
-        if tool is not None:
-            _add_tool(plotter, tool)
-        shown = _corners(window) if window else np.vstack([mesh.points for mesh in (body, tool) if mesh])
-        _aim(plotter, shown, (0.0, 0.0, 1.0) if flat else view, up, flat)
-        Path(path).parent.mkdir(parents=True, exist_ok=True)
-        plotter.screenshot(path)
-        plotter.close()
+        surface, linear = _surface(body, averaged=not names), bool(body.celltypes.max() < 15)  # VTK's first order
+        content = _Content(
+            surface, scalars, _bar(label, body.cell_data[scalars], limits, names), sharp_edges(surface, mirror),
+            None if crack is None else _deformed(crack, mirror, clip), tool, flat, edges=linear,
+        )  # fmt: skip
+        shown = corners(window) if window else np.vstack([mesh.points for mesh in (body, tool) if mesh])
+        fine = _fine(path)
+        figure = content.figure(
+            View(shown, (0.0, 0.0, 1.0) if flat else view, up), title=title, length=length, dpi=fine
+        )
+        _save(figure, path)
     except Exception as error:  # a picture is never worth a run
         logger.warning("%s was not drawn: %s", path, error)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the stages of one run are drawn: all of them in one frame and with one range of colours.
+
+    Attributes:
+        shown: Points that are to be seen in all pictures [length].
+        limits: Range of the stress [stress].
+    """
+
+    shown: NDArray[np.float64]
+    limits: tuple[float, float]
+
+    @classmethod
+    def of(cls, stages: Sequence[Stage]) -> Self:
+        """The look of some stages, one or more, as `Stage.whole` gives them."""
+        boxes = [skin.deformed for stage in stages for skin in (stage.body, stage.tools) if len(skin.points)]
+        ends = np.array([(points.min(axis=0), points.max(axis=0)) for points in boxes])
+        box = np.stack([ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)], axis=1)
+        largest = max(_range(stage.body.values["stress"])[1] for stage in stages)
+        return cls(corners(box), (0.0, largest or 1.0))
+
+    def figure(self, stage: Stage, *, title: str = "", dpi: int = _FINE) -> Figure:
+        """Picture of a stage, coloured by von Mises' stress and the damage of its cracks.
+
+        Args:
+            stage: The stage, as `Stage.whole` gives it.
+            title: Text above the picture; by default the time.
+            dpi: Pixels per inch; the picture has 8 by 5 inches.
+        """
+        body = _polydata(stage.body)
+        tool, crack = (_polydata(skin) if len(skin.cells) else None for skin in (stage.tools, stage.cracks))
+        bar = Bar(stage.units.label("von Mises stress", "stress"), STRESS, self.limits)
+        content = _Content(body, "stress", bar, sharp_edges(body), crack, tool, stage.flat)
+        title = title or f"time {stage.time:.4g} {stage.units.time}"
+        return content.figure(self._view(stage), title=title, length=stage.units.length, dpi=dpi)
+
+    def _view(self, stage: Stage) -> View:
+        right, up = np.asarray(stage.right), np.asarray(stage.up)
+        back = np.cross(right, up)
+        return View(self.shown, back if stage.flat else _ASIDE @ np.stack([right, up, back]), up)
+
+
+def _polydata(skin: Skin) -> pyvista.PolyData:
+    """A part of a stage as it is deformed."""
+    import pyvista
+
+    corners_ = skin.cells.shape[1]
+    cells = np.insert(skin.cells, 0, corners_, axis=1).ravel()
+    mesh = pyvista.PolyData(skin.deformed, **{"faces" if corners_ == 3 else "lines": cells})
+    for name, values in skin.values.items():
+        (mesh.cell_data if len(values) == len(skin.cells) and name != "stress" else mesh.point_data)[name] = values
+    return mesh
 
 
 def draw_stress(path: Path | str, solids: Solid | Sequence[Solid], crack: Crack | None = None, **view: Any) -> None:
     """Draw the deformed body coloured by von Mises' stress, and a crack by its damage. Collective.
 
     Args:
-        path: The PNG, 1600 × 1000; folders are made.
+        path: The PNG of 1600 × 1000 pixels, PDF or SVG; folders are made.
         solids: The body, in one part or several.
         crack: A crack of it with a cohesive law.
         view: Further arguments of `draw_body`; the label is that of stresses in MPa by default.
@@ -105,6 +209,30 @@ def draw_stress(path: Path | str, solids: Solid | Sequence[Solid], crack: Crack 
     faces = None if crack is None else gather_facets(u, crack.points.facets, crack.facet_mean("damage"))
     grid = gather_grid(u, {"stress": VonMises(solids)()})
     draw_body(path, grid, "stress", crack=faces, **{"label": "von Mises stress [MPa]", **view})
+
+
+def _bar(label: str, values: NDArray[np.float64], limits: tuple[float, float] | None, names: Sequence[str]) -> Bar:
+    if names:
+        return Bar(label, part_colours(len(names)), (-0.5, len(names) - 0.5), names)
+    return Bar(label, STRESS, limits or _range(values))
+
+
+def part_colours(count: int) -> Colormap:
+    """Colours of the parts of a body.
+
+    Args:
+        count: Number of parts.
+    """
+    return ListedColormap(PARTS[:count]) if count <= len(PARTS) else colormaps["YlGnBu"].resampled(count)
+
+
+def _fine(path: Path | str) -> int:
+    return _FINE if Path(path).suffix == ".png" else 2 * _FINE
+
+
+def _save(figure: Figure, path: Path | str) -> None:
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
 
 
 def _deformed(
@@ -120,111 +248,13 @@ def _deformed(
     return grid
 
 
-def _stage(title: str) -> pyvista.Plotter:
-    """A white stage with a strip for the colour bars below it."""
-    import pyvista
-
-    # Without a display VTK would try X first and complain; without libEGL it would then end the process.
-    if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW"))):
-        ctypes.CDLL("libEGL.so.1")
-        os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
-    plotter = pyvista.Plotter(
-        off_screen=True, window_size=(1600, 1000), shape=(2, 1), row_weights=(0.87, 0.13), border=False,
-        lighting="light kit",
-    )  # fmt: skip
-    plotter.set_background("white")
-    plotter.subplot(0, 0)
-    plotter.enable_anti_aliasing("ssaa")
-    if title:
-        plotter.add_text(title, position="upper_edge", font_size=12, color="black")
-    return plotter
+def _surface(body: pyvista.DataSet, *, averaged: bool) -> pyvista.PolyData:
+    """Surface with the cell data at its nodes, or as they are."""
+    grid = body.cell_data_to_point_data() if averaged else body
+    return grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2)
 
 
-def _surface(body: pyvista.DataSet) -> pyvista.PolyData:
-    return body.cell_data_to_point_data().extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2)
-
-
-def _add_body(
-    plotter: pyvista.Plotter,
-    body: pyvista.DataSet,
-    scalars: str,
-    label: str,
-    limits: tuple[float, float],
-    flat: bool,
-) -> None:
-    linear = bool(body.celltypes.max() < 15)  # VTK's first-order cells; others are drawn in parts
-    actor = plotter.add_mesh(
-        _surface(body), scalars=scalars, cmap="viridis", clim=limits, show_edges=linear, edge_color="#20242a",
-        edge_opacity=0.25, line_width=1, lighting=not flat, ambient=0.35, diffuse=0.75, specular=0.1,
-        smooth_shading=not flat, split_sharp_edges=not flat, show_scalar_bar=False,
-    )  # fmt: skip
-    _add_bar(plotter, actor, label, 0.08)
-
-
-def _add_outline(plotter: pyvista.Plotter, body: pyvista.DataSet, mirror: Sequence[str]) -> None:
-    """Sharp and outer edges, without the seams where the body is mirrored."""
-    edges = _surface(body).extract_feature_edges(40.0)
-    seam = [np.isclose(edges.cell_centers().points[:, "xyz".index(plane)], 0.0) for plane in mirror]
-    edges = edges.extract_cells(~np.any(seam, axis=0)) if mirror else edges
-    if edges.n_cells:
-        plotter.add_mesh(edges, color="#20242a", line_width=2, lighting=False)
-
-
-def _range(values: NDArray[np.float64]) -> tuple[float, float]:
+def _range(values: NDArray[Any]) -> tuple[float, float]:
     """Range of the colours: without the peaks at sharp edges, and from zero if the field begins near it."""
     low, high = np.percentile(values, (1.0, 99.0))
     return float(0.0 if 0.0 <= low < 0.1 * high else low), float(high)
-
-
-def _add_crack(plotter: pyvista.Plotter, crack: pyvista.DataSet, flat: bool) -> None:
-    actor = plotter.add_mesh(
-        crack, scalars="damage", cmap="magma", clim=(0.0, 1.0), line_width=7 if flat else 1, lighting=False,
-        show_scalar_bar=False,
-    )  # fmt: skip
-    mapper = actor.mapper  # shown before the face of the body that is in the same place
-    mapper.SetResolveCoincidentTopologyToPolygonOffset()
-    mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-4.0, -4.0)
-    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
-    _add_bar(plotter, actor, "damage of the crack", 0.56)
-
-
-def _add_bar(plotter: pyvista.Plotter, actor: pyvista.Actor, label: str, left: float) -> None:
-    plotter.subplot(1, 0)
-    plotter.add_scalar_bar(
-        title=label + "\n", mapper=actor.mapper, vertical=False, position_x=left, position_y=0.05, width=0.36,
-        height=0.85, title_font_size=24, label_font_size=20, n_labels=5, fmt="%.2g", color="black",
-    )  # fmt: skip
-    plotter.subplot(0, 0)
-
-
-def _add_tool(plotter: pyvista.Plotter, tool: pyvista.PolyData) -> None:
-    plotter.add_mesh(
-        tool, color="#a3adb8", opacity=0.45, specular=1.0, specular_power=15, smooth_shading=True,
-        split_sharp_edges=True,
-    )  # fmt: skip
-
-
-def _aim(
-    plotter: pyvista.Plotter,
-    points: NDArray[np.float64],
-    view: Sequence[float],
-    up: Sequence[float],
-    flat: bool,
-) -> None:
-    """Turn the camera so that the points fill the stage."""
-    import pyvista
-
-    if flat:
-        plotter.enable_parallel_projection()
-    plotter.view_vector(view, viewup=up)
-    camera, aspect = plotter.camera, plotter.renderer.GetTiledAspectRatio()
-    projection = pyvista.array_from_vtkmatrix(camera.GetCompositeProjectionTransformMatrix(aspect, -1.0, 1.0))
-    projected = np.c_[points, np.ones(len(points))] @ projection.T
-    seen = projected[:, :2] / projected[:, 3:]  # the stage is the square from -1 to 1
-    zoom = 1.8 / np.ptp(seen, axis=0).max()
-    camera.zoom(zoom)
-    camera.SetWindowCenter(*(zoom * (seen.min(axis=0) + seen.max(axis=0)) / 2.0))
-
-
-def _corners(box: Sequence[float]) -> NDArray[np.float64]:
-    return np.stack(np.meshgrid(*np.reshape(box, (3, 2))), axis=-1).reshape(-1, 3)

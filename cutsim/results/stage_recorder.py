@@ -19,7 +19,7 @@ from cutsim.bodies.solid import Solid
 from cutsim.results.grids import VonMises, gather_facets, gather_grid, library
 from cutsim.results.output import Closing, on_root
 from cutsim.results.stages import FOLDER, Skin, Stage
-from cutsim.results.tool_surfaces import ToolSurfaces
+from cutsim.results.tool_surfaces import ToolSurfaces, front
 
 if TYPE_CHECKING:
     import pyvista
@@ -131,6 +131,7 @@ class _Scene:
             t for t in offering(terms, FacetShowing) if isinstance(t, Bonded) and "damage" in t.facet_fields
         ]
         self._tools = ToolSurfaces(terms) if state.mesh.comm.rank == 0 else None
+        self._front = front(terms) if state.mesh.geometry.dim == 3 else {}
 
     def stage(self) -> Stage | None:
         """The present state, on the first rank; None on the others, and where it cannot be drawn."""
@@ -161,6 +162,7 @@ class _Scene:
             self._parts,
             self._units,
             flat=self._state.mesh.geometry.dim == 2,
+            **self._front,
             mirror=self._mirror,
         )
 

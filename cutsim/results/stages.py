@@ -25,6 +25,7 @@ FOLDER = "stages"
 
 # what a stage consists of
 _SKINS = ("body", "cracks", "tools")
+_ABOUT = ("time", "parts", "flat", "right", "up", "mirror")
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,8 @@ class Stage:
         parts: Names of the parts of the body.
         units: Units of all numbers.
         flat: Whether the problem is a plane one.
+        right: Direction that points to the right where it is looked at from the front.
+        up: Direction that points up there.
         mirror: Planes of symmetry through the origin in which everything has its image, by the axes normal to them.
     """
 
@@ -104,6 +107,8 @@ class Stage:
     parts: tuple[str, ...]
     units: Units
     flat: bool
+    right: tuple[float, ...] = (1.0, 0.0, 0.0)
+    up: tuple[float, ...] = (0.0, 1.0, 0.0)
     mirror: tuple[str, ...] = ()
 
     def whole(self) -> Self:
@@ -116,8 +121,8 @@ class Stage:
 
     def write(self, path: Path) -> None:
         """Write the stage as arrays of numpy, in one go."""
-        about = {"time": self.time, "parts": self.parts, "units": asdict(self.units), "flat": self.flat}
-        arrays: dict[str, Any] = {"about": json.dumps(about | {"mirror": self.mirror})}
+        about = {name: getattr(self, name) for name in _ABOUT} | {"units": asdict(self.units)}
+        arrays: dict[str, Any] = {"about": json.dumps(about)}
         for name in _SKINS:
             skin: Skin = getattr(self, name)
             arrays |= {f"{name}.points": skin.points, f"{name}.displacement": skin.displacement}
@@ -138,16 +143,9 @@ class Stage:
             with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
             about = json.loads(str(arrays.pop("about")))
-            return cls(
-                about["time"],
-                _skin(arrays, "body"),
-                _skin(arrays, "cracks"),
-                _skin(arrays, "tools"),
-                parts=tuple(about["parts"]),
-                units=Units(**about["units"]),
-                flat=about["flat"],
-                mirror=tuple(about["mirror"]),
-            )
+            about = {name: tuple(value) if isinstance(value, list) else value for name, value in about.items()}
+            about |= {name: _skin(arrays, name) for name in _SKINS} | {"units": Units(**about["units"])}
+            return cls(**about)
         except Exception as error:  # whatever numpy finds wrong with a file
             raise ValueError(f"{path} is not a stage of a run: {error}") from error
 

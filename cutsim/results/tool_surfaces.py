@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,20 +17,17 @@ from cutsim.base.arrays import Array
 from cutsim.base.compat import nodal_expression
 from cutsim.results.grids import library
 from cutsim.tools.pointed import Pointed
-from cutsim.tools.shapes import Shape
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 
 if TYPE_CHECKING:
     import pyvista
 
-#: How far a tool is seen beyond the body, as a part of the largest extent of the body.
-BEYOND = 0.15
+# how far a tool is seen beyond the body: a part of the largest extent of the body; for a blade or needle, of the extent
+# along its push, and of that along its edge
+_BEYOND, _ABOVE, _BESIDE = 0.15, 0.3, 0.05
 # cells along an edge of the grid on which a signed distance is sampled, by dimension
 _SAMPLES = {2: 240, 3: 56}
-
-# from the lowest and the highest corner of a box, shape (2, 3), to the surface in it
-_Surface = Callable[[Array], Any]
 
 
 def prism(
@@ -99,13 +97,15 @@ class ToolSurfaces:
     """
 
     def __init__(self, terms: Iterable[Any]) -> None:
-        known: dict[Any, _Surface] = {}
+        self._pointed: list[tuple[Pointed, fem.Constant]] = []
+        self._others: list[Callable[[Array], Any]] = []
         for tool in terms:
             if isinstance(tool, TriangulatedTool):
-                known[tool] = _Triangulated(tool)
-            elif isinstance(tool, ToolContact):  # what meets several parts of a crack is one tool
-                known.setdefault((tool.shape, *tool.position.value), _shaped(tool, tool.shape))
-        self._surfaces = list(known.values())
+                self._others.append(_Triangulated(tool))
+            elif isinstance(tool, ToolContact) and isinstance(tool.shape, Pointed):
+                self._pointed.append((tool.shape, tool.position))
+            elif isinstance(tool, ToolContact):
+                self._others.append(_Level(tool))
 
     def __call__(self, bounds: Sequence[float]) -> pyvista.PolyData | None:
         """The tools in triangles; None if there are none.
@@ -114,45 +114,48 @@ class ToolSurfaces:
             bounds: Box around the deformed body, (xmin, xmax, ymin, ymax, zmin, zmax) [length].
         """
         box = np.reshape(bounds, (3, 2)).T
-        box = box + BEYOND * np.ptp(box, axis=0).max() * np.array([[-1.0], [1.0]])
-        parts = [part.triangulate() for surface in self._surfaces if (part := surface(box)).n_cells]
+        parts = [_pointed(shape, _padded(tip), box) for tip, shape in self._together().items()]
+        parts += [surface(box) for surface in self._others]
+        parts = [part.triangulate() for part in parts if part.n_cells]
         return parts[0].append_polydata(*parts[1:]) if parts else None
 
+    def _together(self) -> dict[tuple[float, ...], Pointed]:
+        """Blades and needles by their place; what meets several parts of a crack is one, and so are two halves."""
+        found: dict[tuple[float, ...], Pointed] = {}
+        for shape, position in self._pointed:
+            tip = tuple(float(x) for x in position.value)
+            other = found.setdefault(tip, shape)
+            if other.side != shape.side:
+                found[tip] = replace(shape, side=0)  # type: ignore[type-var]
+        return found
 
-def _shaped(tool: ToolContact, shape: Shape) -> _Surface:
-    return _Pointed(tool, shape) if isinstance(shape, Pointed) else _Level(tool, shape)
 
-
-class _Pointed:
-    """A blade or needle, or half of it, from its tip to the end of a box."""
-
-    def __init__(self, tool: ToolContact, shape: Pointed) -> None:
-        self._position, self._shape = tool.position, shape
-        self._push = _padded(shape.push)
-        across = np.eye(3)[2 if len(shape.push) == 2 else int(np.abs(self._push).argmin())]
-        lateral = np.cross(across, self._push) if shape.lateral is None else _padded(shape.lateral)
-        self._lateral = lateral / np.linalg.norm(lateral)
-
-    def __call__(self, box: Array) -> Any:
-        shape, push, tip = self._shape, self._push, _padded(self._position.value)
-        arms = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - tip
-        outline = shape.outline(max(float(np.max(-arms @ push)), shape.tip_radius))
-        flat, half = len(shape.push) == 2, shape.side != 0
-        if shape.round and not flat:
-            turn = (-np.pi / 2, np.pi / 2) if half else (0.0, 2 * np.pi)
-            return revolved(outline, tip, ((shape.side or 1) * self._lateral, -push), turn=turn)
-        if half:
-            outline = outline[shape.side * outline[:, 0] >= 0]
-        edge = np.cross(push, self._lateral)
-        low, high = float(np.min(arms @ edge)), float(np.max(arms @ edge))
-        axes = (self._lateral, -push)
-        return prism(outline, tip, axes) if flat else prism(outline, tip + low * edge, axes, (high - low) * edge)
+def _pointed(shape: Pointed, tip: Array, box: Array) -> Any:
+    """A blade or needle, or half of it, from its tip to above the lowest and highest corner of a box."""
+    push, flat = _padded(shape.push), len(shape.push) == 2
+    across = np.eye(3)[2 if flat else int(np.abs(push).argmin())]
+    lateral = np.cross(across, push) if shape.lateral is None else _padded(shape.lateral)
+    lateral = lateral / np.linalg.norm(lateral)
+    edge = np.cross(push, lateral)
+    arms = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - tip
+    (foot, top), (low, high) = ((np.min(arms @ e), np.max(arms @ e)) for e in (-push, edge))
+    outline = shape.outline(max(top + _ABOVE * (top - foot), shape.tip_radius))
+    if shape.round and not flat:
+        turn = (-np.pi / 2, np.pi / 2) if shape.side else (0.0, 2 * np.pi)
+        return revolved(outline, tip, ((shape.side or 1) * lateral, -push), turn=turn)
+    if shape.side:
+        outline = outline[shape.side * outline[:, 0] >= 0]
+    beside = _BESIDE * (high - low)
+    start = tip + (low - beside) * edge
+    if flat:
+        return prism(outline, tip, (lateral, -push))
+    return prism(outline, start, (lateral, -push), (high - low + 2 * beside) * edge)
 
 
 class _Level:
     """A tool of any shape within a box, from the signed distance at the nodes of a regular grid."""
 
-    def __init__(self, tool: ToolContact, shape: Shape) -> None:
+    def __init__(self, tool: ToolContact) -> None:
         self._position, gdim = tool.position, len(tool.position.value)
         n, comm = _SAMPLES[gdim], MPI.COMM_SELF
         domain = (
@@ -164,10 +167,11 @@ class _Level:
         x = ufl.SpatialCoordinate(domain)
         place = ufl.as_vector([self._corner[i] + self._size[i] * x[i] for i in range(gdim)])
         self._distance = fem.Function(fem.functionspace(domain, ("Lagrange", 1)))
-        self._expression = nodal_expression(shape.distance(place), self._distance.function_space)
+        self._expression = nodal_expression(tool.shape.distance(place), self._distance.function_space)
 
     def __call__(self, box: Array) -> Any:
         pyvista, gdim = library("no tool is drawn"), len(self._position.value)
+        box = box + _BEYOND * np.ptp(box, axis=0).max() * np.array([[-1.0], [1.0]])
         size = np.ptp(box, axis=0)
         self._corner.value[:], self._size.value[:] = box[0, :gdim] - self._position.value, size[:gdim]
         self._distance.interpolate(self._expression)
@@ -194,6 +198,25 @@ class _Triangulated:
 
     def __call__(self, box: Array) -> Any:
         return self._mesh.translate(_padded(self._position.value))
+
+
+def front(terms: Iterable[Any]) -> dict[str, tuple[float, ...]]:
+    """Directions that point to the right and up where a body in space is looked at from the front.
+
+    A tool that is pushed comes from above; its flanks and the crack between them are seen from the side.
+
+    Args:
+        terms: Terms of the problem.
+
+    Returns:
+        "right" and "up"; nothing if no tool tells.
+    """
+    for tool in terms:
+        push = getattr(tool.shape, "push", None) if isinstance(tool, ToolContact) else None
+        if push is not None:
+            right = getattr(tool.shape, "lateral", None) or np.cross(push, np.eye(3)[int(np.abs(push).argmin())])
+            return {"right": tuple(map(float, right)), "up": tuple(-float(p) for p in push)}
+    return {}
 
 
 def _closed(lines: NDArray[np.int64]) -> list[int]:

@@ -1,0 +1,163 @@
+"""Scenes: bodies, cracks and tools seen from a direction without perspective (pyvista, off screen)."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import Colormap, LinearSegmentedColormap
+from numpy.typing import ArrayLike, NDArray
+
+from cutsim.base.arrays import Array
+
+if TYPE_CHECKING:
+    import pyvista
+
+#: Colours of damage, from an intact bond to a broken one; apart from those of stress on either end.
+DAMAGE = LinearSegmentedColormap.from_list("damage", ["#f4ece6", "#f2a98a", "#c4302b", "#5a0012"])
+#: Colours of stress.
+STRESS = "viridis"
+
+_LINE = "#20242a"
+# part of the picture that the body takes, in the direction in which it is larger
+_FILLED = 0.92
+# sharp edges are drawn: those at which the surface turns by more than this angle [°]
+_SHARP = 40.0
+
+
+@dataclass(frozen=True)
+class View:
+    """Direction and frame of a view.
+
+    Attributes:
+        shown: Points that are to be seen, shape (points, 3) [length].
+        towards: Direction from the body to the eye.
+        up: Direction that points up.
+    """
+
+    shown: Array
+    towards: ArrayLike
+    up: ArrayLike
+
+    def aim(self, camera: Any, aspect: float) -> float:
+        """Aim a camera so that the points fill the picture; returns the height that is seen [length].
+
+        Args:
+            camera: The camera of pyvista.
+            aspect: Width of the picture over its height.
+        """
+        back = np.asarray(self.towards, dtype=float) / np.linalg.norm(self.towards)
+        right = np.cross(np.asarray(self.up, dtype=float), back)
+        right /= np.linalg.norm(right)
+        axes = np.stack([right, np.cross(back, right), back])
+        seen = self.shown @ axes.T
+        low, high = seen.min(axis=0), seen.max(axis=0)
+        width, height, depth = high - low
+        scene = max(width / aspect, height) / _FILLED
+        camera.focal_point = (low + high) / 2 @ axes
+        camera.position = camera.focal_point + (depth + scene) * back
+        camera.up = axes[1]
+        camera.parallel_projection = True
+        camera.parallel_scale = scene / 2
+        return float(scene)
+
+
+class Scene:
+    """Scene that is drawn off screen. Use it as a context manager.
+
+    Args:
+        size: Width and height of the picture [pixels].
+        flat: Whether it is that of a plane problem, seen without light and shadow.
+    """
+
+    def __init__(self, size: tuple[int, int], *, flat: bool) -> None:
+        import pyvista
+
+        # Without a display VTK would try X first and complain; without libEGL it would then end the process.
+        if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW"))):
+            ctypes.CDLL("libEGL.so.1")
+            os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
+        self._size, self._flat = size, flat
+        self._plotter = pyvista.Plotter(off_screen=True, window_size=size, lighting="light kit")
+        self._plotter.enable_anti_aliasing("ssaa")
+
+    def add_body(
+        self,
+        surface: pyvista.PolyData,
+        scalars: str,
+        colours: str | Colormap,
+        limits: tuple[float, float],
+        *,
+        edges: bool = False,
+    ) -> None:
+        """Add a body coloured by a field, with its sharp and outer edges."""
+        self._plotter.add_mesh(
+            surface, scalars=scalars, cmap=colours, clim=limits, show_edges=edges, edge_color=_LINE, edge_opacity=0.25,
+            line_width=1, lighting=not self._flat, ambient=0.35, diffuse=0.75, specular=0.1,
+            smooth_shading=not self._flat, split_sharp_edges=not self._flat, show_scalar_bar=False,
+        )  # fmt: skip
+
+    def add_lines(self, lines: pyvista.DataSet) -> None:
+        """Add edges of a body."""
+        if lines.n_cells:
+            self._plotter.add_mesh(lines, color=_LINE, line_width=2, lighting=False)
+
+    def add_crack(self, faces: pyvista.DataSet) -> None:
+        """Add faces of a crack, coloured by their ``damage``."""
+        actor = self._plotter.add_mesh(
+            faces, scalars="damage", cmap=DAMAGE, clim=(0.0, 1.0), line_width=5 if self._flat else 1, lighting=False,
+            show_scalar_bar=False,
+        )  # fmt: skip
+        mapper = actor.mapper  # shown before the face of the body that is in the same place
+        mapper.SetResolveCoincidentTopologyToPolygonOffset()
+        mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-4.0, -4.0)
+        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
+
+    def add_tool(self, tool: pyvista.PolyData) -> None:
+        """Add rigid tools."""
+        self._plotter.add_mesh(
+            tool, color="#a3adb8", opacity=0.45, specular=1.0, specular_power=15, smooth_shading=not self._flat,
+            split_sharp_edges=not self._flat, lighting=not self._flat,
+        )  # fmt: skip
+
+    def shot(self, view: View) -> tuple[NDArray[np.uint8], float]:
+        """Draw the scene.
+
+        Returns:
+            Pixels on a transparent ground, shape (height, width, 4), and the width of the picture [length].
+        """
+        width, height = self._size
+        seen = view.aim(self._plotter.camera, width / height)
+        self._plotter.reset_camera_clipping_range()
+        pixels = self._plotter.screenshot(transparent_background=True, return_img=True)
+        return np.asarray(pixels), seen * width / height
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._plotter.close()
+
+
+def sharp_edges(surface: pyvista.PolyData, seams: Sequence[str] = ()) -> pyvista.DataSet:
+    """Sharp and outer edges of a surface, without those in planes of symmetry through the origin.
+
+    Args:
+        surface: The surface.
+        seams: The planes, by the axes normal to them.
+    """
+    edges = surface.extract_feature_edges(_SHARP)
+    if not seams or not edges.n_cells:
+        return edges
+    seam = [np.isclose(edges.cell_centers().points[:, "xyz".index(plane)], 0.0) for plane in seams]
+    return edges.extract_cells(~np.any(seam, axis=0))
+
+
+def corners(box: ArrayLike) -> Array:
+    """Corners of a box (xmin, xmax, ymin, ymax, zmin, zmax)."""
+    return np.stack(np.meshgrid(*np.reshape(box, (3, 2))), axis=-1).reshape(-1, 3)

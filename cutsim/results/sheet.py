@@ -1,0 +1,98 @@
+"""Sheets: a drawn scene with its title, bars of colours and scale, as a figure of matplotlib."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+#: Part of the height that is left to the scene; below it are bars and scale.
+SCENE = 0.87
+#: Size of a picture [inch].
+SIZE = (8.0, 5.0)
+
+_TITLE = 0.94
+# where the bars are: left end and width
+_PLACES = ((0.06, 0.34), (0.47, 0.26))
+_SCALE_END, _SCALE_LARGEST = 0.95, 0.17
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Legend of a field.
+
+    Attributes:
+        label: What it is, with the unit; mathematics of TeX is set.
+        colours: Its colours.
+        limits: Its range.
+        names: Names of its values 0, 1, …, where it has these only.
+    """
+
+    label: str
+    colours: str | Colormap
+    limits: tuple[float, float]
+    names: Sequence[str] = ()
+
+
+def compose(pixels: NDArray[np.uint8], width: float, bars: Sequence[Bar], *, title: str, length: str) -> Figure:
+    """Put a scene on a sheet.
+
+    Args:
+        pixels: The scene, shape (height, width, 4).
+        width: Its width [length].
+        bars: Its fields, two at most.
+        title: Text above it.
+        length: Symbol of the unit of length.
+
+    Returns:
+        The figure; it is white unless matplotlib's ``savefig.transparent`` says otherwise.
+    """
+    figure = Figure(figsize=SIZE, dpi=pixels.shape[1] / SIZE[0])
+    scene = figure.add_axes((0.0, 1.0 - SCENE, 1.0, SCENE))
+    scene.imshow(pixels, aspect="auto", interpolation="none" if pixels.shape[1] >= 1600 else "antialiased")
+    scene.axis("off")
+    if title:
+        figure.text(0.5, _TITLE, title, ha="center", fontsize=11)
+    for bar, place in zip(bars, _PLACES, strict=False):
+        _add_names(figure, bar) if bar.names else _add_bar(figure, bar, *place)
+    _add_scale(figure, width, length)
+    return figure
+
+
+def _add_bar(figure: Figure, bar: Bar, left: float, width: float) -> None:
+    axes = figure.add_axes((left, 0.065, width, 0.022))
+    shown = ScalarMappable(Normalize(*bar.limits), bar.colours)
+    ticks = MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10])
+    colour_bar = figure.colorbar(shown, cax=axes, orientation="horizontal", ticks=ticks)
+    colour_bar.outline.set_linewidth(0.5)
+    colour_bar.ax.tick_params(labelsize=8, width=0.5, length=2.5)
+    axes.set_title(bar.label, fontsize=9, pad=4)
+
+
+def _add_names(figure: Figure, bar: Bar) -> None:
+    colours = colormaps[bar.colours] if isinstance(bar.colours, str) else bar.colours
+    handles: list[Any] = [Patch(color=colours(i), label=name) for i, name in enumerate(bar.names)]
+    figure.legend(
+        handles=handles, loc="lower left", bbox_to_anchor=(0.02, 0.0), ncols=min(len(handles), 4), fontsize=8.5,
+        frameon=False, title=bar.label or None, title_fontsize=9, handlelength=1.2, handleheight=0.9, alignment="left",
+    )  # fmt: skip
+
+
+def _add_scale(figure: Figure, width: float, length: str) -> None:
+    """A bar whose length is a round number, in the corner below the scene."""
+    largest = _SCALE_LARGEST * width
+    decade = 10.0 ** np.floor(np.log10(largest))
+    size = max(round_ * decade for round_ in (1.0, 2.0, 5.0) if round_ * decade <= largest * (1 + 1e-9))
+    ends = (_SCALE_END - size / width, _SCALE_END)
+    figure.add_artist(Line2D(ends, (0.076, 0.076), color="black", linewidth=2.0, solid_capstyle="butt"))
+    figure.text(sum(ends) / 2, 0.035, f"{size:g} {length}", ha="center", fontsize=9)
