@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cutsim.results.pictures import Look
-from cutsim.results.stages import FOLDER, Stage, read_stages
+from cutsim.results.stages import FOLDER, Stage, read_stages, spread
 
 logger = logging.getLogger(__name__)
 
@@ -39,7 +39,7 @@ def draw_stages(folder: Path | str, number: int = PICTURES) -> list[Path]:
         older.unlink()
     drawn: list[Path] = []
     try:
-        for index, stage in enumerate(_spread(stages, number)):
+        for index, stage in enumerate(spread(stages, number)):
             path = Path(folder) / FOLDER / f"{index:02d}.png"
             Look.of(stages).figure(stage).savefig(path)
             drawn.append(path)
@@ -90,12 +90,3 @@ def _pixels(figure: Figure) -> NDArray[np.uint8]:
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[..., :3]
-
-
-def _spread(stages: Sequence[Stage], number: int) -> list[Stage]:
-    """Some stages whose times are evenly spread, the last one among them, in the order of time."""
-    if not stages:
-        return []
-    times = np.array([stage.time for stage in stages])
-    wanted = times[-1] * np.arange(1, number + 1) / number
-    return [stages[i] for i in sorted({int(np.abs(times - time).argmin()) for time in wanted})]

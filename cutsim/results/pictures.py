@@ -35,8 +35,8 @@ logger = logging.getLogger(__name__)
 #: Colours of the parts of a body; more of them are told apart by a ramp.
 PARTS = ("#9ecae1", "#fdd0a2", "#c7e9c0", "#dadaeb", "#f7c6c7", "#e2d3b5", "#c2e5e5", "#e6e6a8")
 
-# from where a body in space is looked at: to the right, up, in front
-_ASIDE = np.array([1.0, 0.7, 1.6])
+#: From where a body in space is looked at: to the right, up, in front.
+ASIDE = np.array([1.0, 0.7, 1.6])
 # damage below which a crack counts as intact
 _INTACT = 1e-3
 # pixels per inch
@@ -170,8 +170,8 @@ class Look:
             title: Text above the picture; by default the time.
             dpi: Pixels per inch; the picture has 8 by 5 inches.
         """
-        body = _polydata(stage.body)
-        tool, crack = (_polydata(skin) if len(skin.cells) else None for skin in (stage.tools, stage.cracks))
+        body = polydata(stage.body)
+        tool, crack = (polydata(skin) if len(skin.cells) else None for skin in (stage.tools, stage.cracks))
         bar = Bar(stage.units.label("von Mises stress", "stress"), STRESS, self.limits)
         content = _Content(body, "stress", bar, sharp_edges(body), crack, tool, stage.flat)
         title = title or f"time {stage.time:.4g} {stage.units.time}"
@@ -180,11 +180,15 @@ class Look:
     def _view(self, stage: Stage) -> View:
         right, up = np.asarray(stage.right), np.asarray(stage.up)
         back = np.cross(right, up)
-        return View(self.shown, back if stage.flat else _ASIDE @ np.stack([right, up, back]), up)
+        return View(self.shown, back if stage.flat else ASIDE @ np.stack([right, up, back]), up)
 
 
-def _polydata(skin: Skin) -> pyvista.PolyData:
-    """A part of a stage as it is deformed."""
+def polydata(skin: Skin) -> pyvista.PolyData:
+    """A part of a stage as it is deformed.
+
+    Args:
+        skin: The part.
+    """
     import pyvista
 
     corners_ = skin.cells.shape[1]

@@ -10,6 +10,7 @@ from typing import Any
 import matplotlib
 import numpy as np
 from cycler import cycler
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
@@ -50,6 +51,22 @@ class Curve:
     style: str = "-"
     partial: bool = False
 
+    @property
+    def text(self) -> str:
+        """Text in the legend."""
+        return f"{self.label} (ends early)".lstrip() if self.partial else self.label
+
+
+def distinct(count: int) -> list[str]:
+    """Colours for some curves, none of which comes twice; many follow a ramp in their order.
+
+    Args:
+        count: Number of curves.
+    """
+    if count <= len(COLOURS):
+        return list(COLOURS[:count])
+    return [to_hex(colour) for colour in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, count))]
+
 
 def plot_curves(
     path: Path | str,
@@ -73,9 +90,9 @@ def plot_curves(
     with matplotlib.rc_context(_style()):
         figure = Figure()
         axes = figure.add_subplot(xlabel=xlabel, ylabel=ylabel, title=title)
+        axes.set_prop_cycle(color=distinct(len(curves)))
         for curve in curves:
-            label = f"{curve.label} (ends early)".lstrip() if curve.partial else curve.label
-            (line,) = axes.plot(curve.x, curve.y, curve.style, label=label or None)
+            (line,) = axes.plot(curve.x, curve.y, curve.style, label=curve.text or None)
             if curve.partial:
                 axes.plot(line.get_xdata()[-1:], line.get_ydata()[-1:], "x", color=line.get_color(), markersize=9)
         for label, level in (references or {}).items():

@@ -152,7 +152,7 @@ class _Scene:
         body = grid.cell_data_to_point_data(pass_cell_data=True)
         body = body.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=1)
         assert self._tools is not None
-        tools = self._tools(grid.warp_by_vector("u").bounds)
+        tools = self._tools(self._bounds(grid))
         cracks = [Skin.of(_nudged(face).extract_geometry(), in_cells=["damage"]) for face in faces if face.n_cells]
         return Stage(
             self._state.time_old,
@@ -165,6 +165,13 @@ class _Scene:
             **self._front,
             mirror=self._mirror,
         )
+
+    def _bounds(self, grid: pyvista.UnstructuredGrid) -> list[float]:
+        """Box around the whole deformed body."""
+        box = np.reshape(grid.warp_by_vector("u").bounds, (3, 2))
+        for axis in ("xyz".index(plane) for plane in self._mirror):
+            box[axis] = np.abs(box[axis]).max() * np.array([-1.0, 1.0])
+        return [float(end) for end in box.ravel()]
 
 
 def _nudged(faces: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:

@@ -23,6 +23,8 @@ Floats = NDArray[np.float32]
 #: Folder of the stages in that of a run.
 FOLDER = "stages"
 
+# distance from a plane of symmetry that is none, over the size of the body
+_FLAT = 1e-6
 # what a stage consists of
 _SKINS = ("body", "cracks", "tools")
 _ABOUT = ("time", "parts", "flat", "right", "up", "mirror")
@@ -74,12 +76,28 @@ class Skin:
         )
 
     def mirrored(self, plane: str) -> Self:
-        """The part with its image in a plane through the origin, given by the axis normal to it."""
-        sign = np.where(np.arange(3) == "xyz".index(plane), -1, 1).astype(np.float32)
-        image = replace(
-            self, points=sign * self.points, displacement=sign * self.displacement, cells=self.cells[:, ::-1]
+        """The part joined with its image in a plane through the origin, given by the axis normal to it.
+
+        Triangles in the plane, which are inside the whole, are left out.
+        """
+        axis, count = "xyz".index(plane), len(self.points)
+        seam = np.abs(self.points[:, axis]) <= _FLAT * np.abs(self.points).max(initial=0.0)
+        images = np.where(seam, np.arange(count), count - 1 + np.cumsum(~seam))
+        inside = seam[self.cells].all(axis=1) & (self.cells.shape[1] == 3)
+        cells = self.cells[~inside]
+        sign = np.where(np.arange(3) == axis, -1, 1).astype(np.float32)
+        values = {name: self._doubled(array, ~seam, ~inside) for name, array in self.values.items()}
+        return replace(
+            self,
+            points=np.vstack([self.points, sign * self.points[~seam]]),
+            displacement=np.vstack([self.displacement, sign * self.displacement[~seam]]),
+            cells=np.vstack([cells, images[cells][:, ::-1]]).astype(np.int32),
+            values=values,
         )
-        return self.joined([self, image])
+
+    def _doubled(self, array: Floats, nodes: NDArray[np.bool_], cells: NDArray[np.bool_]) -> Floats:
+        """Values of a part and its image, which has some of the nodes; both have some of the cells."""
+        return np.r_[array, array[nodes]] if len(array) == len(self.points) else np.tile(array[cells], 2)
 
 
 @dataclass(frozen=True)
@@ -97,7 +115,8 @@ class Stage:
         flat: Whether the problem is a plane one.
         right: Direction that points to the right where it is looked at from the front.
         up: Direction that points up there.
-        mirror: Planes of symmetry through the origin in which everything has its image, by the axes normal to them.
+        mirror: Planes of symmetry through the origin in which body and cracks have their image, by the axes normal to
+            them.
     """
 
     time: float
@@ -112,11 +131,10 @@ class Stage:
     mirror: tuple[str, ...] = ()
 
     def whole(self) -> Self:
-        """The stage with its images in the planes of symmetry."""
+        """The stage with the images of body and cracks in the planes of symmetry; tools are whole in any case."""
         stage = replace(self, mirror=())
         for plane in self.mirror:
-            skins = {name: getattr(stage, name).mirrored(plane) for name in _SKINS}
-            stage = replace(stage, **skins)
+            stage = replace(stage, body=stage.body.mirrored(plane), cracks=stage.cracks.mirrored(plane))
         return stage
 
     def write(self, path: Path) -> None:
@@ -174,3 +192,17 @@ def read_stages(folder: Path | str) -> list[Stage]:
             continue
         found[stage.time] = stage
     return [found[time] for time in sorted(found)]
+
+
+def spread(stages: Sequence[Stage], number: int) -> list[Stage]:
+    """Some stages whose times are evenly spread, the last one among them, in the order of time.
+
+    Args:
+        stages: All stages, in this order.
+        number: How many there are at most.
+    """
+    if not stages:
+        return []
+    times = np.array([stage.time for stage in stages])
+    wanted = times[-1] * np.arange(1, number + 1) / number
+    return [stages[i] for i in sorted({int(np.abs(times - time).argmin()) for time in wanted})]
