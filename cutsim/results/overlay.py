@@ -34,12 +34,13 @@ class Overlay:
         main = next((run.curve for run in runs if run.curve), None)
         if main is None:
             return None
-        shown = [(run, label) for run, label in zip(runs, labels, strict=True) if set(main) <= set(run.history)]
-        x, y = (shown[0][0].history[name] for name in main)
+        x, y = main
+        shown = [(run, label) for run, label in zip(runs, labels, strict=True) if {x, y} <= set(run.history)]
+        first = shown[0][0].history
         curves = [
-            Curve(*(run.history[name].values for name in main), label, partial=not run.complete) for run, label in shown
+            Curve(run.history[x].values, run.history[y].values, label, partial=not run.complete) for run, label in shown
         ]
-        return cls(tuple(curves), x.label, y.label)
+        return cls(tuple(curves), first[x].label, first[y].label)
 
     def plot(self, path: Path | str, title: str = "") -> None:
         """Plot the curves. Call it on one rank.

@@ -145,10 +145,12 @@ class RunFiles:
 
     @property
     def curve(self) -> tuple[str, str] | None:
-        """Columns of the main curve; None if there are none.
+        """Columns of the main curve; None if there are none or they are empty.
 
         Abscissa and ordinate under ``"curve"`` in the summary win, if there are such columns.
         """
+        if not self.steps:
+            return None
         given = self.summary.get("curve") or (None, None)
         x = next((name for name in (given[0], *_ABSCISSAE) if name in self.history), None)
         forces = [name for name in self.history if name.endswith(("_force", "_reaction")) or "_force_" in name]
@@ -166,7 +168,10 @@ def _summary(path: Path) -> Mapping[str, Any]:
 
 def _history(path: Path) -> Mapping[str, Column]:
     text = path.read_text(encoding="utf-8")
-    header, *rows = csv.reader(text[: text.rfind("\n") + 1].splitlines())  # a run that was killed may leave half a row
+    lines = text[: text.rfind("\n") + 1].splitlines()  # a run that was killed may leave half a row
+    if not lines:
+        raise ValueError("it is empty")
+    header, *rows = csv.reader(lines)
     columns = np.array(rows, dtype=np.float64).reshape(-1, len(header)).T
     named = [(*label.removesuffix("]").split(" ["), "")[:2] for label in header]
     return {name: Column(name, unit, values) for (name, unit), values in zip(named, columns, strict=True)}

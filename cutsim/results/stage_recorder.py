@@ -153,7 +153,11 @@ class _Scene:
         body = body.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=1)
         assert self._tools is not None
         tools = self._tools(self._bounds(grid))
-        cracks = [Skin.of(_nudged(face).extract_geometry(), in_cells=["damage"]) for face in faces if face.n_cells]
+        cracks = [
+            Skin.of(_nudged(face).extract_surface(algorithm=None), in_cells=["damage"])
+            for face in faces
+            if face.n_cells
+        ]
         return Stage(
             self._state.time_old,
             Skin.of(body, ["stress"], ["part"]),

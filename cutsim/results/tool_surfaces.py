@@ -179,7 +179,7 @@ class _Level:
         flat = np.arange(3) >= gdim
         grid = pyvista.UnstructuredGrid(cells, kinds, np.where(flat, 0.0, box[0]) + points * np.where(flat, 0.0, size))
         grid["distance"] = self._distance.x.array
-        return grid.clip_scalar("distance", value=0.0).extract_surface(algorithm="dataset_surface")
+        return grid.clip_scalar(scalars="distance", value=0.0).extract_surface(algorithm="dataset_surface")
 
 
 class _Triangulated:

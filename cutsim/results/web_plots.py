@@ -48,14 +48,19 @@ def columns_json(history: Mapping[str, Column]) -> str:
 
 
 def energy_json(history: Mapping[str, Column]) -> str | None:
-    """Energy audit: what is stored and dissipated, stacked, beside the work; None if the history has no audit.
+    """Energy audit: what is stored and dissipated, stacked, beside the work.
 
     Args:
         history: The columns.
+
+    Returns:
+        The plot; None if the history has no audit or no rows.
     """
     if not {"time", "work_external", "energy_closure"} <= set(history):
         return None
     time, work = history["time"], history["work_external"]
+    if not len(time.values):
+        return None
     figure = go.Figure(layout=LAYOUT)
     for name, (label, colour) in ENERGIES.items():
         if name in history and np.any(history[name].values):

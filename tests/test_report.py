@@ -1,0 +1,119 @@
+"""The report of a run is one page that says first what is to be thought of it, and needs nothing else."""
+
+import json
+import re
+from html.parser import HTMLParser
+
+import pytest
+
+from cutsim.results.presentation import plot_run, present
+from cutsim.results.report import write_report, write_sweep_report
+from cutsim.results.run_files import RunFiles
+from helpers.stages import HEADER, write_run
+
+CASE = """title = "A cut </script> & more"
+[units]
+length = "mm"
+[material]
+young = "0.8 MPa"
+[loads.press]
+value = "0.1*t"
+"""
+
+
+class Page(HTMLParser):
+    """Text of a page without scripts and styles, and the addresses that it loads."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.words, self.loaded, self.scripts, self._inside = [], [], [], ""
+        self.feed(path.read_text(encoding="utf-8"))
+        self.text = " ".join(" ".join(self.words).split())
+
+    def handle_starttag(self, tag, attributes):
+        self._inside = tag
+        self.loaded += [value for name, value in attributes if name in ("src", "href", "poster", "srcset", "data")]
+
+    def handle_endtag(self, tag):
+        self._inside = ""
+
+    def handle_data(self, data):
+        if self._inside == "script":
+            self.scripts.append(data)
+        elif self._inside != "style":
+            self.words.append(data)
+
+    def value(self, name):
+        """What a script of the page calls by a name."""
+        (found,) = re.findall(rf"const {name} = (\{{.*\}});", "\n".join(self.scripts[1:]))
+        return json.loads(found)
+
+
+def test_page_has_the_numbers_and_needs_nothing_else(tmp_path):
+    write_run(
+        tmp_path, until=1.0, verdict="trusted", versions={"cutsim": "9.9"}, ranks=2, mesh={"cells": 77}, gain=0.25
+    )
+    (tmp_path / "case.toml").write_text(CASE)
+    for name in ("setup.png", "animation.mp4"):
+        (tmp_path / name).write_bytes(b"a picture")
+    page = Page(present(tmp_path, animation=False))
+    words = page.text
+    start = words.index("A cut </script> & more trusted The run is complete")  # behind the title of the window
+    assert start < 60 and "largest force 3 N" in words and "at depth 1 mm" in words and "0.01 %" in words
+    assert "Numbers without a unit are in mm, N, s, K" in words and "young 0.8 MPa" in words and "0.1*t" in words
+    assert "cells 77" in words and "gain 0.25" in words and "cutsim run case.toml -n 2" in words
+    assert "Not in this report" not in words
+    assert {address.partition(":")[0] for address in page.loaded} == {"data"}
+    kinds = [address[5:].partition(";")[0] for address in page.loaded]
+    assert kinds.count("video/mp4") == 1 and kinds.count("image/png") == 1 + 3
+    assert page.value("columns")["force"] == {"label": "force [N]", "values": [0.6, 1.2, 1.8, 2.4, 3.0]}
+    view = page.value("view")
+    assert [stage["label"] for stage in view["stages"]] == ["time 0 s", "time 0.5 s", "time 1 s"][
+        -len(view["stages"]) :
+    ]
+    assert "</script" not in "".join(page.scripts[1:])
+    assert {path.name for path in tmp_path.glob("*.pdf")} == {"force.pdf", "energy.pdf"}
+
+
+@pytest.mark.parametrize(
+    ("summary", "grade", "sentence"),
+    [
+        ({"verdict": "questionable", "reasons": ["a hole"], "until": 1.0}, "questionable", "but One reason speaks"),
+        ({"verdict": "questionable", "reasons": ["no step succeeds"]}, "failed", "ended at time 1 of 2 s, 50%"),
+        ({"verdict": "questionable", "reasons": ["interrupted at time 1 of 2"]}, "interrupted", "50%"),
+        ({}, "unknown", "no verdict"),
+    ],
+)
+def test_what_speaks_against_a_run_is_said_first(tmp_path, summary, grade, sentence):
+    write_run(tmp_path, **summary)
+    words = Page(write_report(tmp_path)).text
+    assert words.startswith(f"{grade}: {tmp_path.name} {tmp_path.name} {grade} ")
+    assert sentence in words[:300] and all(reason in words[:400] for reason in summary.get("reasons", ()))
+    assert "Not in this report" in words and "case.toml is not there" in words and "no animation" in words
+
+
+def test_report_of_nothing_names_what_is_missing(tmp_path):
+    words = Page(write_report(tmp_path / "none")).text
+    assert "no verdict" in words and "history.csv is not there" in words and "no stage was recorded" in words
+    for history in ("", HEADER + "\n", HEADER + "\n1,0.5,"):
+        (tmp_path / "history.csv").write_text(history)
+        (tmp_path / "summary.json").write_text('{"verdict": ')
+        words = Page(write_report(tmp_path)).text
+        assert "summary.json cannot be read" in words and "there is no curve" in words
+        assert plot_run(RunFiles.read(tmp_path)) == []
+
+
+def test_report_of_a_sweep_has_a_row_and_a_curve_for_each_run(tmp_path):
+    for i, summary in enumerate(
+        [{"verdict": "trusted", "until": 1.0}, {"verdict": "questionable", "reasons": ["late"]}]
+    ):
+        write_run(tmp_path / "runs" / str(i), **summary)
+    runs = {tmp_path / "runs" / str(i): {"tool.friction": i / 10} for i in range(3)}
+    path = write_sweep_report(tmp_path, runs)
+    page = Page(path)
+    assert "3 runs: 1 trusted , 1 failed , 1 unknown" in page.text
+    assert "tool.friction" in page.text and "0.2 unknown" in page.text and "late" in page.text
+    assert page.loaded[1:] == [f"runs/{i}/report.html" for i in range(3)]
+    (overlay,) = re.findall(r'draw\("overlay", (\{.*\})\);', page.scripts[-1])
+    names = [trace.get("name") for trace in json.loads(overlay)["data"]]
+    assert names == ["tool.friction = 0.0", "tool.friction = 0.1 (ends early)", None]
