@@ -4,6 +4,7 @@ from .analysis.stepping import StepControl as StepControl
 from .analysis.stepping import StepError as StepError
 from .analysis.stepping import StepReport as StepReport
 from .analysis.stepping import run as run
+from .bodies.body_force import BodyForce as BodyForce
 from .bodies.loads import NodalForce as NodalForce
 from .bodies.loads import Pressure as Pressure
 from .bodies.loads import Support as Support

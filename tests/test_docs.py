@@ -187,15 +187,15 @@ def test_tangent_of_cone(shape, friction):
 # -- term, step control ------------------------------------------------------------------------------------------------
 
 
-def test_gravity():
-    """A block in a frictionless box sinks by ρ g L²/2M; the floor carries its weight and the audit closes."""
+def test_foundation():
+    """A pressed block sinks by p/k + p L/M; the springs carry the load and the audit closes."""
     page = run_page("adding_a_term")
-    young, poisson, weight = page["young"], page["poisson"], page["density"]
+    young, poisson, pressure = page["young"], page["poisson"], page["pressure"]
     modulus = young * (1 - poisson) / ((1 + poisson) * (1 - 2 * poisson))
-    assert page["sunk"] == pytest.approx(weight / (2 * modulus), rel=1e-9)
+    assert page["sunk"] == pytest.approx(pressure / page["stiffness"] + pressure / modulus, rel=1e-9)
     last = page["rows"][-1]
-    assert last["floor_force"] == pytest.approx(weight, rel=1e-9) and last["gravity_force_y"] == pytest.approx(-weight)
-    assert abs(last["energy_closure"]) < 1e-10
+    assert last["foundation_force_y"] == pytest.approx(pressure, rel=1e-9)
+    assert last["load_force_y"] == pytest.approx(-pressure) and abs(last["energy_closure"]) < 1e-10
 
 
 def test_step_control():

@@ -141,7 +141,7 @@ class Load(Term, ABC):
     """Base of loads whose forces are proportional to a factor that varies in time."""
 
     def __init__(
-        self, state: State, factor: TimeFunction, parameter: str, name: str, corners: tuple[float, ...]
+        self, state: State, factor: float | TimeFunction, parameter: str, name: str, corners: tuple[float, ...]
     ) -> None:
         require_numbers("corners", corners, least=0)
         self.name, self.state, self._corners = name, state, corners
