@@ -25,6 +25,7 @@ from cutsim import (
 from cutsim.base.parameters import numbers
 from cutsim.base.units import Kind, Units
 from cutsim.cases import CaseError, check_groups, read_case
+from cutsim.cases.document import File
 from cutsim.cases.expressions import evaluate
 from cutsim.cases.quantities import Converter, split
 from cutsim.cases.schema_materials import in_units
@@ -398,3 +399,15 @@ def test_corrupted_files_are_refused_in_clear_words(written, monkeypatch):
             for problem in error.problems:
                 assert re.fullmatch(rf"{re.escape(str(path))}:\d+: .*\w.*", problem)
                 assert not re.search(r"pydantic|[Ii]nput|validat|function-|None|<\w+>:", problem), problem
+
+
+def test_the_line_of_each_key(written):
+    """Also in lists of tables, in values of several lines, and behind keys with dots."""
+    text = "# head|a = 1|b.c = [|  1,|  [2]]||[d.e]|f = { g = 1 }|[[h]]|i = 1|[h.j]|k = '''|[x]|'''|[[h]]|i = 2|[h.j]|k = 3"
+    file = File(written(text), text.replace("|", "\n"))
+    places = {
+        ("a",): 2, ("b",): 3, ("b", "c"): 3, ("b", "c", 1, 0): 3, ("d",): 7, ("d", "e", "f"): 8,
+        ("d", "e", "f", "g"): 8, ("h",): 9, ("h", 0): 9, ("h", 0, "i"): 10, ("h", 0, "j"): 11, ("h", 0, "j", "k"): 12, ("h", 1): 15,
+        ("h", 1, "i"): 16, ("h", 1, "j", "k"): 18, ("h", 1, "z"): 15, ("z",): 1,
+    }  # fmt: skip
+    assert {keys: int(file.place(keys).rpartition(":")[2]) for keys in places} == places

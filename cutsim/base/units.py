@@ -82,7 +82,7 @@ class Kind:
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         """What may be written in a case file: a number, or a text with a quantity or an expression."""
-        return {"anyOf": [{"type": "number"}, {"type": "string"}]}
+        return {"anyOf": [{"type": "number"}, {"type": "string"}], "x-kind": self.name}
 
 
 #: A dimensionless number.

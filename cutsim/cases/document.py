@@ -42,17 +42,21 @@ class File:
 
     @cached_property
     def _lines(self) -> dict[Keys, int]:
-        """Line of each key: the first one after which the file has it."""
-        lines, found = self.text.split("\n"), dict[Keys, int]()
-        start = 1
-        for number in range(1, len(lines) + 1):
+        """Line at which each key is given first; of the keys within a value that at which it begins."""
+        found, arrays = dict[Keys, int](), dict[Keys, int]()
+        table: Keys = ()
+        statement, start = "", 1
+        for number, line in enumerate(self.text.split("\n"), start=1):
+            statement += f"{line}\n"
             try:
-                tables = tomllib.loads("\n".join(lines[:number]) + "\n")
-            except ValueError:  # within a list or a text of several lines
+                given = tomllib.loads(statement)
+            except ValueError:  # it goes on in the next line
                 continue
-            for keys in _paths(tables):
+            if statement.lstrip().startswith("["):
+                table, given = _header(given, arrays), {}
+            for keys in (*(table[:n] for n in range(len(table))), *((*table, *keys) for keys in _paths(given))):
                 found.setdefault(keys, start)
-            start = number + 1
+            statement, start = "", number + 1
         return found
 
     @property
@@ -130,6 +134,24 @@ class Document:
         tables = _merged(self.tables, other.tables)
         left = set(_paths(tables))
         return Document(tables, {k: origin for k, origin in {**self.origins, **other.origins}.items() if k in left})
+
+
+def _header(given: Mapping[str, Any], arrays: dict[Keys, int]) -> Keys:
+    """Keys of the table that a header begins.
+
+    Args:
+        given: The header as a document of its own.
+        arrays: Number of the last entry of each list of tables; that which the header begins is counted.
+    """
+    keys: Keys = ()
+    node: Any = given
+    while node:
+        key, node = next(iter(node.items()))
+        keys = (*keys, key)
+        if isinstance(node, list):
+            arrays[keys], node = arrays.get(keys, -1) + 1, node[0]
+        keys += (arrays[keys],) if keys in arrays else ()
+    return keys
 
 
 def _short(value: Any) -> str:

@@ -19,6 +19,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Discriminator,
+    GetJsonSchemaHandler,
     Field,
     PrivateAttr,
     Strict,
@@ -60,6 +61,18 @@ class Table(BaseModel):
     """Table of a case file."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Schema with what the docstring says of each key."""
+        json = handler(schema)
+        table = handler.resolve_ref_schema(json)
+        described = arguments_of(cls)
+        for name, entry in table.get("properties", {}).items():
+            if name in described:
+                entry.setdefault("description", described[name])
+        table["description"] = summary(cls)
+        return json
 
     @model_validator(mode="before")
     @classmethod
@@ -108,7 +121,7 @@ class Varying:
         """What may be written."""
         numbers = {"type": "array", "items": _NUMBER}
         table = {"type": "object", "properties": {"times": numbers, "values": numbers}, "required": ["times", "values"]}
-        return {"anyOf": [*_NUMBER["anyOf"], table]}
+        return {"anyOf": [*_NUMBER["anyOf"], table], "x-kind": self.kind.name}
 
 
 def _whole(value: Any, info: ValidationInfo) -> int:
