@@ -1,54 +1,74 @@
-"""JSON schema of case files, by which editors complete keys and show what they mean."""
+"""JSON schema of case files, by which editors complete keys and say what they mean."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic.json_schema import GenerateJsonSchema
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaWarningKind
 
 from cutsim.base.units import Units
 from cutsim.cases.keys import SINGULAR
 from cutsim.cases.schema import CaseTables
 
+_NULL = {"type": "null"}
+
 
 class _Generator(GenerateJsonSchema):
-    # defaults that are objects of cutsim, and checks without a form in JSON
-    ignored_warning_kinds = frozenset({"non-serializable-default", "skipped-choice"})
+    def emit_warning(self, kind: JsonSchemaWarningKind, detail: str) -> None:
+        """Nothing: defaults that are objects of cutsim, and checks without a form in JSON, are left out."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """Keys have no titles beside their descriptions."""
+        return False
 
 
 def case_schema() -> dict[str, Any]:
-    """JSON schema of case files, with descriptions and the usual units."""
-    schema = CaseTables.model_json_schema(schema_generator=_Generator)
-    schema["$schema"], schema["title"] = "https://json-schema.org/draft/2020-12/schema", "Case file of cutsim"
-    tables = [schema, *schema["$defs"].values()]
-    for table in tables:
+    """JSON schema of case files, with the meaning of each key and its unit."""
+    raw = CaseTables.model_json_schema(schema_generator=_Generator)
+    schema: dict[str, Any] = _without_null(raw)
+    for table in (schema, *schema["$defs"].values()):
         for entry in table.get("properties", {}).values():
             _describe(entry)
     for table in (schema, schema["$defs"]["Heat"]):
         _add_short_forms(table["properties"])
-    return schema
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Case file of cutsim"}
+    # a file that extends another one need not give all tables
+    whole = {"if": {"not": {"required": ["extends"]}}, "then": {"required": schema["required"]}}
+    return head | {key: value for key, value in schema.items() if key not in ("title", "required")} | whole
+
+
+def _without_null(entry: Any) -> Any:
+    """A schema without null, which TOML does not have."""
+    if isinstance(entry, list):
+        return [_without_null(part) for part in entry if part != _NULL]
+    if not isinstance(entry, Mapping):
+        return entry
+    parts = {key: _without_null(part) for key, part in entry.items() if key != "default" or part is not None}
+    if len(parts.get("anyOf", ())) == 1:
+        (only,) = parts.pop("anyOf")
+        parts = {**only, **parts}
+    return parts
 
 
 def kinds_in(entry: Any) -> Iterator[str]:
-    """Kinds of the numbers that a schema allows."""
-    if isinstance(entry, Mapping):
-        if "x-kind" in entry:
-            yield entry["x-kind"]
-        for part in entry.values():
-            yield from kinds_in(part)
-    if isinstance(entry, list):
-        for part in entry:
-            yield from kinds_in(part)
+    """Kinds of the numbers that a schema allows, those of tables that it refers to apart."""
+    parts = entry.values() if isinstance(entry, Mapping) else entry if isinstance(entry, list) else ()
+    if isinstance(entry, Mapping) and "x-kind" in entry:
+        yield entry["x-kind"]
+    for part in parts:
+        yield from kinds_in(part)
 
 
 def _describe(entry: dict[str, Any]) -> None:
-    """Add the usual unit to what is said of a key."""
+    """Say in which unit a number is, and None as it is in a file."""
+    if "description" in entry:
+        entry["description"] = entry["description"].replace("None", "left out").replace("``", "`")
     units = [Units().of(kind) for kind in dict.fromkeys(kinds_in(entry)) if kind != "one"]
     if units:
-        entry["description"] = f"{entry.get('description', '')} Unit: {', '.join(units)} by default.".strip()
+        entry["description"] = f"{entry.get('description', '')} Unit: {', '.join(units)} unless [units] says otherwise."
 
 
 def _add_short_forms(properties: dict[str, Any]) -> None:
     for short, key in SINGULAR.items():
         if key in properties:
-            (entry,) = (properties[key].get("patternProperties") or {"": properties[key]["additionalProperties"]}).values()
-            properties[short] = {**entry, "description": f"The only one of {key}, or one of them with this name."}
+            entries = properties[key].get("patternProperties") or {"": properties[key]["additionalProperties"]}
+            properties[short] = {**next(iter(entries.values())), "description": f"Short for [{key}.{short}]."}

@@ -6,6 +6,8 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator
 from pydantic_core import CoreSchema, core_schema
 
+from cutsim.cases import geometries
+
 
 class Known:
     """Annotation of a name that has to be known.
@@ -20,6 +22,10 @@ class Known:
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         """How it is read."""
         return core_schema.with_info_after_validator_function(self._check, core_schema.str_schema(strict=True))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: Any) -> dict[str, Any]:
+        """What may be written: a text, one of those that are the same in all files."""
+        return {"type": "string"} | ({"enum": geometries.names()} if self.kind == "geometries" else {})
 
     def _check(self, name: str, info: Any) -> str:
         known = info.context.names(self.kind)

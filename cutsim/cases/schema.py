@@ -41,7 +41,7 @@ class Header(Table):
 
     title: str = ""
     extends: str | None = None
-    units: Annotated[Units, FromTable(), AfterValidator(consistent)] = Units()
+    units: Annotated[Units, FromTable(), AfterValidator(consistent)] = Field(default_factory=Units)
     parameters: dict[Parameter, Free] = Field(default_factory=dict)
 
 
@@ -107,11 +107,11 @@ class CaseTables(Parts, Header):
         quick: Tables with a coarser mesh or a shorter run for a first try; they take part where this is asked for.
     """
 
-    analysis: Analysis = Analysis()
+    analysis: Analysis = Field(default_factory=Analysis)
     steps: Steps
-    solver: Solver = Solver()
+    solver: Solver = Field(default_factory=Solver)
     measures: dict[Named, Measure] = Field(default_factory=dict)
-    output: Output = Output()
+    output: Output = Field(default_factory=Output)
     quick: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("*", mode="wrap")

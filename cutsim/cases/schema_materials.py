@@ -1,7 +1,7 @@
 """Schema of case files: materials, by their parameters or by a name of the library, and laws."""
 
 from dataclasses import fields, is_dataclass, replace
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from pydantic import BeforeValidator, Discriminator, PrivateAttr, Tag, ValidationInfo, model_validator
 from pydantic_core import CoreSchema
@@ -86,6 +86,6 @@ def _none(value: Any) -> Any:
 AnyMaterial = Annotated[Material, _AnyMaterial()]
 Law = Annotated[CohesiveLaw, FromTable()]
 #: A law, or "none" for a crack that is already broken: contact only.
-LawOrNone = Annotated[Law | None, BeforeValidator(_none)]
+LawOrNone = Annotated[Law | None, BeforeValidator(_none, json_schema_input_type=Law | Literal["none"])]
 Friction = Annotated[FrictionLaw | float, FromTable()]
 Contact = Annotated[PenaltyContact, FromTable()]

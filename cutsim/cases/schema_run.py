@@ -7,11 +7,11 @@ from pydantic_core import CoreSchema
 
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.units import Length, Number, Time
-from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
+from cutsim.bodies.schemes import Newmark, Scheme
 from cutsim.cases.names import BodyName, CrackName, ToolName
 from cutsim.cases.tables import Constructed, Flag, FromTable, Table, Whole, With, annotated, made, table_of
 from cutsim.studies.drive import Drive
-from cutsim.studies.fixture import STANDING, Fixture
+from cutsim.studies.fixture import Fixture
 
 
 class Insertion(Constructed):
@@ -32,7 +32,7 @@ class Insertion(Constructed):
     push: Whole = 1
     notch: Length = 0.0
     groups: tuple[str, str, str] = ("crack", "notch", "right")
-    fixture: Annotated[Fixture, FromTable()] = STANDING
+    fixture: Annotated[Fixture, FromTable()] = Field(default_factory=Fixture)
     damping: Time = 0.0
 
     @property
@@ -54,7 +54,7 @@ class Analysis(Table):
 
     type: Literal["quasi-static", "dynamic"] = "quasi-static"
     until: Time | None = None
-    scheme: Annotated[Scheme, FromTable()] = TRAPEZOIDAL
+    scheme: Annotated[Scheme, FromTable()] = Field(default_factory=Newmark)
     mass: Literal["consistent", "lumped"] = "consistent"
 
 

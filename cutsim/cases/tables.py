@@ -19,8 +19,8 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Discriminator,
-    GetJsonSchemaHandler,
     Field,
+    GetJsonSchemaHandler,
     PrivateAttr,
     Strict,
     Tag,
@@ -71,7 +71,7 @@ class Table(BaseModel):
         for name, entry in table.get("properties", {}).items():
             if name in described:
                 entry.setdefault("description", described[name])
-        table["description"] = summary(cls)
+        table["description"] = table.get("description", "").split("\n")[0]
         return json
 
     @model_validator(mode="before")
@@ -347,12 +347,19 @@ def table_of(kind: type, base: type[Table] = Constructed, key: str = "", name: s
         return self
 
     return create_model(
-        f"{kind.__name__}Table",
+        _title(kind, base, key),
         __base__=base,
-        __doc__=summary(kind),
+        __doc__=summary(kind if key or base is Constructed else base),
         __validators__={"make": model_validator(mode="after")(make)},  # type: ignore[dict-item]
         **fields,
     )
+
+
+def _title(kind: type, base: type[Table], key: str) -> str:
+    """Name of a table: that of its class, if it says so by a key or not, and of what it has beside the class."""
+    if base is not Constructed:
+        return f"{kind.__name__}{base.__name__}" if key else base.__name__
+    return kind.__name__ if key else f"{kind.__name__}Parameters"
 
 
 # ---- docstrings

@@ -254,9 +254,9 @@ class IsochoricOgden(_NearlyIncompressible):
         ValueError: A constant is outside its range, or there are not as many moduli as exponents.
     """
 
-    moduli: tuple[float, ...]
+    moduli: tuple[Stress, ...]
     exponents: tuple[float, ...]
-    bulk: float
+    bulk: Stress
 
     def __post_init__(self) -> None:
         _require_terms(self.moduli, self.exponents)
