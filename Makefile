@@ -57,8 +57,9 @@ $(DOCS_STAMP): pyproject.toml $(STAMP)
 	$(PYTHON_IN_VENV) -m pip install --quiet --disable-pip-version-check -c .venv/constraints.txt -e '.[docs]'
 	@touch $@
 
-api: $(STAMP) ## write docs/api.md from the docstrings
+api: $(STAMP) ## write docs/api.md and the keys in docs/case_files.md from the docstrings
 	$(PYTHON_IN_VENV) docs/make_api.py
+	$(PYTHON_IN_VENV) docs/make_case_files.py
 
 docs: $(DOCS_STAMP) ## build docs/_build/html
 	$(PYTHON_IN_VENV) -m sphinx -W --keep-going -b html docs docs/_build/html

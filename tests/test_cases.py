@@ -4,9 +4,11 @@ import math
 import pickle
 import random
 import re
+import tomllib
 
 import dolfinx.jit
 import gmsh
+import jsonschema
 import pytest
 
 from cutsim import (
@@ -24,9 +26,10 @@ from cutsim import (
 )
 from cutsim.base.parameters import numbers
 from cutsim.base.units import Kind, Units
-from cutsim.cases import CaseError, check_groups, read_case
+from cutsim.cases import CaseError, built_in_cases, case_schema, check_groups, read_case
 from cutsim.cases.document import File
 from cutsim.cases.expressions import evaluate
+from cutsim.cases.json_schema import kinds_in
 from cutsim.cases.quantities import Converter, split
 from cutsim.cases.schema_materials import in_units
 from cutsim.fields import meshing
@@ -403,11 +406,39 @@ def test_corrupted_files_are_refused_in_clear_words(written, monkeypatch):
 
 def test_the_line_of_each_key(written):
     """Also in lists of tables, in values of several lines, and behind keys with dots."""
-    text = "# head|a = 1|b.c = [|  1,|  [2]]||[d.e]|f = { g = 1 }|[[h]]|i = 1|[h.j]|k = '''|[x]|'''|[[h]]|i = 2|[h.j]|k = 3"
-    file = File(written(text), text.replace("|", "\n"))
+    text = "# head|a = 1|b.c = [|  1,|  [2]]||[d.e]|f = { g = 1 }|[[h]]|i = 1|[h.j]|k = '''|[x]|'''"
+    text += "|[[h]]|i = 2|[h.j]|k = 3"
+    file = File(written(""), text.replace("|", "\n"))
     places = {
         ("a",): 2, ("b",): 3, ("b", "c"): 3, ("b", "c", 1, 0): 3, ("d",): 7, ("d", "e", "f"): 8,
-        ("d", "e", "f", "g"): 8, ("h",): 9, ("h", 0): 9, ("h", 0, "i"): 10, ("h", 0, "j"): 11, ("h", 0, "j", "k"): 12, ("h", 1): 15,
-        ("h", 1, "i"): 16, ("h", 1, "j", "k"): 18, ("h", 1, "z"): 15, ("z",): 1,
+        ("d", "e", "f", "g"): 8, ("h",): 9, ("h", 0): 9, ("h", 0, "i"): 10, ("h", 0, "j"): 11, ("h", 0, "j", "k"): 12,
+        ("h", 1): 15, ("h", 1, "i"): 16, ("h", 1, "j", "k"): 18, ("h", 1, "z"): 15, ("z",): 1,
     }  # fmt: skip
     assert {keys: int(file.place(keys).rpartition(":")[2]) for keys in places} == places
+
+
+# ---- the schema
+
+
+def test_schema_fits_what_is_read(written):
+    """By the rules of JSON schemas, and for all built-in cases that are whole files."""
+    validator = jsonschema.Draft202012Validator(case_schema())
+    validator.check_schema(case_schema())
+    texts = [path.read_text(encoding="utf-8") for _, path in built_in_cases().values()]
+    texts = [BLADE, PEELED, *(text for text in texts if "\nextends" not in text)]
+    assert len(texts) > 10
+    for text in texts:
+        validator.validate(tomllib.loads(text))
+    for right, wrong in (("young", "yuong"), ('"blade"', '"knife"'), ("speed = ", "speed = true #")):
+        assert not validator.is_valid(tomllib.loads(BLADE.replace(right, wrong)))
+
+
+def test_each_number_with_a_unit_has_its_kind():
+    """What a description gives a unit in brackets is checked by dimension, also in classes that are added later."""
+    tables = {name: table.get("properties", {}) for name, table in case_schema()["$defs"].items()}
+    keys = [(name, key, entry) for name, table in tables.items() for key, entry in table.items()]
+    pattern = re.compile(r"\[(1/)?(stress|length|time|force|temperature|energy|power|mass|rad)\b")
+    numbers = [(name, key, entry) for name, key, entry in keys if pattern.search(entry.get("description", ""))]
+    assert len(numbers) > 60
+    assert not [(name, key) for name, key, entry in numbers if not set(kinds_in(entry)) - {"one"}]
+    assert tables["NeoHookean"]["young"]["description"].endswith("Unit: MPa unless [units] says otherwise.")

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import cutsim
+from cutsim.cases import read_case
+from cutsim.cases.expressions import FUNCTIONS
 from cutsim.fields.points import Surface
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
@@ -237,3 +239,20 @@ def test_page_of_the_api_is_up_to_date(monkeypatch):
     import make_api
 
     assert (DOCS / "api.md").read_text(encoding="utf-8") == make_api.page(), "make api writes it anew"
+
+
+def test_page_of_case_files_is_up_to_date(monkeypatch):
+    monkeypatch.syspath_prepend(str(DOCS))
+    import make_case_files
+
+    assert make_case_files.PAGE.read_text(encoding="utf-8") == make_case_files.page(), "make api writes it anew"
+
+
+def test_case_of_the_page_on_case_files(tmp_path):
+    """It is read, and the functions that the page lists are those that there are."""
+    page = (DOCS / "case_files.md").read_text(encoding="utf-8")
+    path = tmp_path / "case.toml"
+    path.write_text(re.search(r"```toml\n(.*?)```", page, re.DOTALL)[1], encoding="utf-8")
+    case = read_case(path)
+    assert case.tools["tool"].made.tip_radius == 0.05 and case.mesh.set["band"] == 0.4
+    assert set(re.search(r"the functions `([\w\s]+)`", page)[1].split()) == set(FUNCTIONS)

@@ -8,7 +8,6 @@ from cutsim.cases.bodies import softest
 from cutsim.cases.domains import Domain
 from cutsim.cases.refusals import refusing
 from cutsim.fields.temperature import Temperature
-from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.crack import Crack
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.pairs.surface_pair import SurfacePair
@@ -32,7 +31,7 @@ def _crack(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.C
             solids[0].state,
             facets,
             plus,
-            _law(domain, table),
+            domain.tables.law_of(table),
             young=table.young or softest(solids, facets),
             name=name,
             contact=table.contact,
@@ -74,7 +73,7 @@ def _pair(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.Pa
             solids[0].state,
             slave,
             master,
-            _law(domain, table),
+            table.law,
             young=table.young or min(softest(solids, slave), softest(solids, master)),
             contact=table.contact,
             friction=table.friction,
@@ -85,8 +84,3 @@ def _pair(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.Pa
             search=table.search,
             name=name,
         )
-
-
-def _law(domain: Domain, table: schema.Interface) -> CohesiveLaw | None:
-    """The law of a crack or pair; that of the case where the table gives none."""
-    return table.law if "law" in table.model_fields_set else domain.tables.law

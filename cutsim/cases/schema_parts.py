@@ -118,6 +118,7 @@ class Pair(Interface):
     Args:
         slave: Groups of facets of the finer or softer surface.
         master: Groups of facets of the other one.
+        law: Cohesive law, with small sliding only; by default contact only.
         small_sliding: Whether each point keeps its partner, as bonds do.
         two_pass: Whether each surface is slave once.
         search: Largest distance of a partner; by default the mean size of the slave facets [length].

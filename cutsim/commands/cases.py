@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
+import json
+from typing import Annotated
+
+import typer
 from rich.table import Table
 
 from cutsim.commands.options import console
 
-EXAMPLES = ("cutsim cases", "cutsim run blade --quick", "cutsim new --from blade -o mine.toml")
+EXAMPLES = (
+    "cutsim cases",
+    "cutsim run blade --quick",
+    "cutsim new --from blade -o mine.toml",
+    "cutsim cases --schema > case.schema.json",
+)
 
 
-def command() -> None:
+def command(
+    schema: Annotated[
+        bool, typer.Option("--schema", help="Print the JSON schema of case files instead, for editors.")
+    ] = False,
+) -> None:
     """List the built-in cases, which run as they are and are copied by `cutsim new --from NAME`."""
-    from cutsim.cases import built_in_cases
+    from cutsim.cases import built_in_cases, case_schema
 
+    if schema:
+        print(json.dumps(case_schema(), indent=1, ensure_ascii=False))
+        return
     table = Table("name", "what it shows", box=None, header_style="bold")
     for name, (title, _) in built_in_cases().items():
         table.add_row(name, title)
