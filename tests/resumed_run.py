@@ -16,6 +16,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from cutsim import Checkpoints, Coulomb, Exponential, Mechanics, PenaltyContact, Recording, StepControl, Support, run
+from cutsim.commands.launch import environment, mpirun
 from helpers.blocks import make_blocks
 
 STEPS, STEP = 40, 0.025
@@ -32,14 +33,14 @@ def problem(comm=MPI.COMM_WORLD, law=LAW, n=4):
     return Mechanics(b.state, [b.solid(), crack], supports)
 
 
-def go(folder, until=STEPS * STEP, comm=MPI.COMM_WORLD, *, every=0, pause=0.0):
-    """Run to a time, from where an earlier call has come to; the history."""
-    mechanics = problem(comm)
+def go(folder, steps=STEPS, *, every=0, pause=0.0):
+    """Go on to a step, from where an earlier call has come to; the history."""
+    mechanics, until = problem(), STEPS * STEP
     checkpoints = Checkpoints(folder / "checkpoint", mechanics, minutes=0, case={"opening": LAW.opening})
     checkpoints.resume()
     with Recording(folder, mechanics, until, every=every, checkpoints=checkpoints) as recording:
-        if mechanics.state.time_old < until - 0.5 * STEP:
-            run(mechanics, until, StepControl.fixed(STEP), recording, stop=lambda _: time.sleep(pause) or False)
+        if mechanics.state.number < steps:
+            run(mechanics, until, StepControl.fixed(STEP), recording, lambda r: time.sleep(pause) or r.number == steps)
     return recording.columns()
 
 
@@ -66,11 +67,11 @@ def storm(folder, ranks, kills, pause=0.05):
     """
     command = [sys.executable, str(Path(__file__).resolve()), "run", str(folder), "--every", "10"]
     if ranks > 1:
-        command = [str(Path(sys.executable).with_name("mpirun")), "-n", str(ranks), *command]
+        command = [str(mpirun()), "-n", str(ranks), *command]
     found = []
     for _ in range(kills):
         known, started = step_of(folder), time.monotonic()
-        process = subprocess.Popen([*command, "--pause", str(pause)], start_new_session=True)
+        process = subprocess.Popen([*command, "--pause", str(pause)], env=environment(), start_new_session=True)
         while step_of(folder) <= known and process.poll() is None:
             time.sleep(0.002)
         time.sleep(random.uniform(0.0, 3 * pause))

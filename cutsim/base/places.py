@@ -64,8 +64,8 @@ class Places:
         if parts is None:
             return None
         numbers, found = (np.concatenate(part) for part in zip(*parts, strict=True))
-        order = np.argsort(numbers)
-        assert np.array_equal(numbers[order], np.arange(len(order))), "an entry is missing, or there twice"
+        _, order = np.unique(numbers, return_index=True)
+        assert len(order) == len(numbers), "a place is owned twice"
         return np.asarray(found[order])
 
     def scatter(self, values: NDArray[Any] | None) -> NDArray[Any]:
@@ -74,14 +74,15 @@ class Places:
         Raises:
             ValueError: There are not as many values as there are places, on all ranks.
         """
-        wanted, sizes = self._comm.gather(self._numbers()), None
-        if wanted is not None:
-            assert values is not None
-            sizes = len(values), 1 + max(int(numbers.max(initial=-1)) for numbers in wanted)
+        wanted, parts, sizes = self._comm.gather(self._numbers()), None, None
+        if wanted is not None and values is not None:
+            known = np.unique(np.concatenate(wanted))
+            sizes = len(values), len(known)
+            parts = [values[np.searchsorted(known, some)] for some in wanted] if sizes[0] == sizes[1] else None
         given, needed = self._comm.bcast(sizes)
         if given != needed:
-            raise ValueError(f"{given} in place of {needed}")
-        rows = self._comm.scatter(None if wanted is None or values is None else [values[some] for some in wanted])
+            raise ValueError(f"{given} values in place of {needed}")
+        rows = self._comm.scatter(parts)
         shaped = rows.reshape(*self.dofs.shape, *rows.shape[1:])
         return np.ascontiguousarray(np.moveaxis(shaped, self._axes[0], self._axes[1]))
 
