@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
@@ -25,6 +26,7 @@ from cutsim.cases.measures import Measure, measures, tool_measures
 from cutsim.cases.parts import Parts
 from cutsim.cases.refusals import refused, refusing
 from cutsim.cases.schema import CaseTables
+from cutsim.cases.setup import draw_setup
 from cutsim.cases.tools import tools
 from cutsim.fields.meshing import TaggedMesh
 from cutsim.solvers.convergence import Tolerances
@@ -46,6 +48,7 @@ class Simulation:
         derived: Further fields for output by name.
         curve: Columns of the history that tell most: abscissa and ordinate.
         mirror: Planes of symmetry through the origin, by the axes normal to them.
+        every: Fields are written every so many steps.
         insertion: The insertion, if it is one.
     """
 
@@ -59,6 +62,7 @@ class Simulation:
     derived: Mapping[str, Expr]
     curve: tuple[str, str]
     mirror: tuple[str, ...] = ()
+    every: int = 5
     insertion: Insertion | None = None
 
     @property
@@ -76,6 +80,14 @@ class Simulation:
         """Number of unknowns of the mechanical problem."""
         space = self.problem.state.V
         return int(space.dofmap.index_map.size_global * space.dofmap.index_map_bs)
+
+    def draw(self, path: Path | str) -> None:
+        """Draw the set-up: mesh, cracks, tools where they begin, and what is held. Collective.
+
+        Args:
+            path: The PNG, PDF or SVG; folders are made.
+        """
+        draw_setup(path, self.mechanics, self.units)
 
     def run(self, record: Recorder) -> None:
         """Run to the end, from the committed time on. Collective.
@@ -194,6 +206,7 @@ def _simulation(
         derived=derived,
         curve=tables.output.curve or curve,
         mirror=tuple(tables.output.mirror or mirror),
+        every=tables.output.every,
         insertion=cut,
     )
 

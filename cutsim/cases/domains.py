@@ -55,11 +55,6 @@ class Domain:
             tagged = cls(tables, document, tagged)._with(name, selection)
         return cls(tables, document, tagged)
 
-    @property
-    def names(self) -> list[str]:
-        """Names of all groups."""
-        return list(self.tagged.names)
-
     def cells(self, key: Keys, names: Sequence[str]) -> Entities:
         """Local cells, ghosts included, of some groups.
 

@@ -29,6 +29,7 @@ class Progress:
         start: Value of the load parameter at which the run begins.
         console: Where to write; standard output by default.
         interval: Seconds between plain lines.
+        quiet: Whether nothing is shown.
 
     Raises:
         ValueError: If the end does not come after the start.
@@ -43,10 +44,11 @@ class Progress:
         start: float = 0.0,
         console: Console | None = None,
         interval: float = 5.0,
+        quiet: bool = False,
     ) -> None:
         require("end", end, end > start, f"greater than start = {start}")
         self._start, self._end, self._title, self._interval = start, end, title, interval
-        self._active = comm.rank == 0
+        self._active = comm.rank == 0 and not quiet
         self._console = console or Console(highlight=False, soft_wrap=True)
         self._line, self._printed, self._last = "", "", -float("inf")
         self._bar: Bar | None = None
@@ -94,7 +96,7 @@ class Progress:
     ) -> None:
         if self._bar is not None:
             self._bar.stop()
-        elif self._line != self._printed:
+        elif self._active and self._line != self._printed:
             self._print()
 
     def _print(self) -> None:

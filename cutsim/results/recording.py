@@ -51,6 +51,7 @@ class Recording:
         checkpoints: Writes checkpoints during the run and at its end. A problem that was resumed from one goes on in
             its folder: rows of the history after the checkpoint are removed, and fields go to files of their own
             (``displacement_2.bp`` and so on).
+        quiet: Whether no progress is shown.
 
     Attributes:
         history: Column → list of values so far, the same on all ranks.
@@ -74,6 +75,7 @@ class Recording:
         every: int = 5,
         overwrite: bool = False,
         checkpoints: Checkpoints | None = None,
+        quiet: bool = False,
     ) -> None:
         require_number("every", every, nonnegative)
         self.folder, self.problem, self._units = Path(folder), problem, units or Units()
@@ -84,7 +86,7 @@ class Recording:
         self.history = self._older() if resumed else dict[str, list[float]]()
         self._table: HistoryWriter | None = None
         comm, start = problem.state.mesh.comm, problem.state.time_old
-        self._progress = self._stack.enter_context(Progress(until, comm, title, start=start))
+        self._progress = self._stack.enter_context(Progress(until, comm, title, start=start, quiet=quiet))
         self._fields: _FieldFiles | None = None
         if every:
             self._fields = _FieldFiles(self.folder, problem, derived or {}, every, self._stack, anew=not resumed)

@@ -113,10 +113,7 @@ class Scene:
             faces, scalars="damage", cmap=DAMAGE, clim=(0.0, 1.0), line_width=5 if self._flat else 1, lighting=False,
             show_scalar_bar=False,
         )  # fmt: skip
-        mapper = actor.mapper  # shown before the face of the body that is in the same place
-        mapper.SetResolveCoincidentTopologyToPolygonOffset()
-        mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-4.0, -4.0)
-        mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
+        _bring_forward(actor.mapper)
 
     def add_tool(self, tool: pyvista.PolyData) -> None:
         """Add rigid tools."""
@@ -124,6 +121,16 @@ class Scene:
             tool, color="#a3adb8", opacity=0.45, specular=1.0, specular_power=15, smooth_shading=not self._flat,
             split_sharp_edges=not self._flat, lighting=not self._flat,
         )  # fmt: skip
+
+    def add_faces(self, faces: pyvista.DataSet, colour: str) -> None:
+        """Add facets, such as those of an intact crack, in one colour."""
+        actor = self._plotter.add_mesh(faces, color=colour, line_width=5 if self._flat else 1, lighting=False)
+        _bring_forward(actor.mapper)
+
+    def add_marks(self, points: Array, colour: str) -> None:
+        """Add marks at some points."""
+        if len(points):
+            self._plotter.add_points(points, color=colour, point_size=14, render_points_as_spheres=True)
 
     def shot(self, view: View) -> tuple[NDArray[np.uint8], float]:
         """Draw the scene.
@@ -144,6 +151,13 @@ class Scene:
         self._plotter.close()
 
 
+def _bring_forward(mapper: Any) -> None:
+    """Show faces before the face of the body that is in the same place."""
+    mapper.SetResolveCoincidentTopologyToPolygonOffset()
+    mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-4.0, -4.0)
+    mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)
+
+
 def sharp_edges(surface: pyvista.PolyData, seams: Sequence[str] = ()) -> pyvista.DataSet:
     """Sharp and outer edges of a surface, without those in planes of symmetry through the origin.
 
@@ -151,7 +165,8 @@ def sharp_edges(surface: pyvista.PolyData, seams: Sequence[str] = ()) -> pyvista
         surface: The surface.
         seams: The planes, by the axes normal to them.
     """
-    edges = surface.extract_feature_edges(_SHARP)
+    # the cells of a plane surface may be turned either way, which is no edge
+    edges = surface.extract_feature_edges(_SHARP, feature_edges=bool(np.ptp(surface.points[:, 2])))
     if not seams or not edges.n_cells:
         return edges
     seam = [np.isclose(edges.cell_centers().points[:, "xyz".index(plane)], 0.0) for plane in seams]

@@ -1,0 +1,202 @@
+"""Run of a case in a folder, in which all that belongs to it is found afterwards."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+import dolfinx
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import cutsim
+from cutsim.analysis.stepping import Interrupted, StepError, StepReport
+from cutsim.cases.building import Simulation
+from cutsim.cases.case import Case
+from cutsim.cases.refusals import refusing
+from cutsim.cases.sizes import mesh_sizes
+from cutsim.results.checkpoints import Checkpoints
+from cutsim.results.output import on_root, replace_file
+from cutsim.results.presentation import present
+from cutsim.results.recording import Recording
+from cutsim.results.stage_recorder import Stages
+
+#: Name of the complete case in the folder of its run.
+CASE = "case.toml"
+#: Picture of the set-up there.
+SETUP = "setup.png"
+#: Folder of the checkpoints in that of the run.
+CHECKPOINTS = "checkpoint"
+#: Exit codes of ends before the time.
+NO_EQUILIBRIUM, CANNOT_WRITE, INTERRUPTED = 3, 4, 130
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """Outcome of a run.
+
+    Attributes:
+        folder: Where the files are.
+        verdict: "trusted" or "questionable".
+        reasons: What speaks against the result.
+        error: What ended the run before its time; None if it came to its end.
+    """
+
+    folder: Path
+    verdict: str
+    reasons: tuple[str, ...] = ()
+    error: BaseException | None = None
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of a command: 0 trusted, 1 questionable, 3 no equilibrium, 4 cannot write, 130 interrupted."""
+        if self.error is None:
+            return int(self.verdict != "trusted")
+        if isinstance(self.error, Interrupted):
+            return INTERRUPTED
+        return CANNOT_WRITE if isinstance(self.error, OSError) else NO_EQUILIBRIUM
+
+
+def run_case(
+    case: Case,
+    folder: Path | str,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    resume: bool = False,
+    overwrite: bool = False,
+    every_minutes: float = 10.0,
+    quiet: bool = False,
+) -> RunOutcome:
+    """Run a case in a folder. Collective.
+
+    Writes the complete case, the history, fields for ParaView, checkpoints, and at the end, also of a run that fails or
+    is interrupted, a summary, plots, pictures and a report.
+
+    Args:
+        case: The case.
+        folder: Where the files go.
+        comm: Communicator of the run.
+        resume: Whether the run goes on from the last checkpoint in the folder, if there is one.
+        overwrite: Whether the results of an older run in the folder are replaced.
+        every_minutes: Time between two checkpoints [min].
+        quiet: Whether no progress is shown.
+
+    Returns:
+        How it has ended.
+
+    Raises:
+        CaseError: The mesh has not what the case names, or parts do not fit; nothing is written then.
+        CheckpointError: The checkpoint is that of another case.
+        FileExistsError: The folder has the results of an older run, which are not to be replaced.
+    """
+    begun, folder = monotonic(), Path(folder)
+    simulation = case.build(comm)
+    checkpoints = Checkpoints(
+        folder / CHECKPOINTS, simulation.problem, minutes=every_minutes, case={"title": case.title}
+    )
+    time = checkpoints.resume() if resume else None
+    if time is None:
+        with refusing(case.document, "supports"):
+            simulation.problem.check()
+    elif time >= simulation.until:  # the run has come to its end
+        return _outcome(simulation, folder)
+    recording = _recording(simulation, folder, checkpoints, overwrite=overwrite, quiet=quiet)
+    on_root(comm, lambda: replace_file(folder / CASE, case.text.encode()))
+    if simulation.problem.state.number == 0:
+        simulation.draw(folder / SETUP)
+    error = _run(simulation, recording)
+    try:
+        recording.summary(_facts(simulation, recording, monotonic() - begun))
+        if case.output.report:
+            on_root(comm, lambda: _present(folder, animation=case.output.animation))
+    except OSError as full:
+        error = error or full
+    return _outcome(simulation, folder, error)
+
+
+def _present(folder: Path, *, animation: bool) -> None:
+    present(folder, animation=animation)
+
+
+def _outcome(simulation: Simulation, folder: Path, error: BaseException | None = None) -> RunOutcome:
+    verdict = simulation.problem.state.verdict
+    return RunOutcome(folder, "trusted" if verdict.trusted else "questionable", verdict.reasons, error)
+
+
+def _recording(
+    simulation: Simulation, folder: Path, checkpoints: Checkpoints, *, overwrite: bool, quiet: bool
+) -> Recording:
+    x, y = simulation.curve
+    return Recording(
+        folder,
+        simulation.problem,
+        simulation.until,
+        title=simulation.title or "run",
+        units=simulation.units,
+        show={x: x, y: y},
+        extra=simulation.columns,
+        derived=simulation.derived,
+        every=simulation.every,
+        overwrite=overwrite,
+        checkpoints=checkpoints,
+        quiet=quiet,
+    )
+
+
+def _run(simulation: Simulation, recording: Recording) -> Exception | KeyboardInterrupt | None:
+    """Run to the end; what has ended it before. Collective."""
+    problem, until = simulation.problem, simulation.until
+    try:
+        with (
+            recording,
+            Stages(recording.folder, problem, until, units=simulation.units, mirror=simulation.mirror) as stages,
+        ):
+
+            def record(report: StepReport) -> None:
+                recording(report)
+                stages(report)
+
+            simulation.run(record)
+    except (Interrupted, StepError, OSError) as error:
+        return error
+    return None
+
+
+def _facts(simulation: Simulation, recording: Recording, seconds: float) -> dict[str, Any]:
+    """What a summary says of a run beside its verdict. Collective."""
+    return {
+        "title": simulation.title,
+        "curve": list(simulation.curve),
+        **_headline(simulation, recording),
+        "unknowns": simulation.unknowns,
+        "mesh": mesh_sizes(simulation),
+        "ranks": simulation.problem.state.mesh.comm.size,
+        "wall_time": seconds,
+        "versions": versions(),
+    }
+
+
+def _headline(simulation: Simulation, recording: Recording) -> dict[str, float]:
+    """Largest and last ordinate of the curve that tells most."""
+    x, y = simulation.curve
+    if not {x, y} <= recording.history.keys():
+        return {}
+    abscissa, ordinate = recording.column(x), recording.column(y)
+    largest = int(np.abs(ordinate).argmax())
+    return {f"largest_{y}": ordinate[largest], f"{x}_at_largest_{y}": abscissa[largest], f"last_{y}": ordinate[-1]}
+
+
+def versions() -> dict[str, str]:
+    """Versions of what has computed a result."""
+    return {
+        "cutsim": cutsim.__version__,
+        "dolfinx": dolfinx.__version__,
+        "PETSc": ".".join(map(str, PETSc.Sys.getVersion())),
+        "MPI": MPI.Get_library_version().splitlines()[0].strip("\0 ")[:60],
+        "Python": platform.python_version(),
+        "system": platform.platform(),
+    }
