@@ -10,8 +10,9 @@ from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import Interrupted, StepControl, StepError, StepReport, begin, run
-from cutsim.base.terms import Energetic, offering
+from cutsim.base.terms import Energetic, Term, offering
 from cutsim.bodies.loads import Support, Traction
+from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
 from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
@@ -319,6 +320,27 @@ def test_refuses_ambiguous_names():
     with pytest.raises(ValueError, match="terms = 0 is not allowed"):
         Mechanics(b.state, [])
     assert isinstance(b.solid().residual(ufl.TestFunction(b.state.V)), ufl.Form)
+
+
+class Unwritten(Term):
+    name = "unwritten"
+
+    def residual(self, v):
+        """Forgets to return what it has written."""
+        ufl.inner(v, v)
+
+
+@pytest.mark.mpi
+def test_what_is_no_term_is_refused_by_its_place_and_what_writes_no_form_by_name():
+    b = make_blocks()
+    with pytest.raises(ValueError, match=r"^terms\[1\] = None is not allowed: it must be a Term$"):
+        Mechanics(b.state, [b.solid(), None])
+    with pytest.raises(ValueError, match=r"^terms\[0\] = <class .*Solid'> is not allowed: it must be a Term$"):
+        Mechanics(b.state, (Solid,))
+    with pytest.raises(ValueError, match=r"^supports\[0\] = .* is not allowed: it must be a Support$"):
+        Mechanics(b.state, [b.solid()], [b.solid()])
+    with pytest.raises(ValueError, match=r"^residual of 'unwritten' = None is not allowed: it must be a ufl.Form"):
+        Mechanics(b.state, [b.solid(), Unwritten()])
 
 
 @pytest.mark.parametrize("step", [float("inf"), float("nan"), 0.0, -1.0])

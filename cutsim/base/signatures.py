@@ -44,7 +44,7 @@ def checked(target: Checked) -> Checked:
             raise TypeError(f"{target.__qualname__.removesuffix('.__init__')}: {error}") from None
         for name, value in given.items():
             if name in hints and not _fits(value, hints[name]):
-                raise Refused(name, value, _words(hints[name]))
+                raise _refused(name, value, hints[name])
         return target(*args, **kwargs)
 
     return call  # type: ignore[return-value]
@@ -82,6 +82,19 @@ def _fits(value: Any, hint: Any) -> bool:
     if getattr(hint, "_is_protocol", False):  # isinstance would run the properties of the value
         return all(inspect.getattr_static(value, name, _MISSING) is not _MISSING for name in _members(hint))
     return isinstance(value, hint) if isinstance(hint, type) else True
+
+
+def _refused(name: str, value: Any, hint: Any) -> Refused:
+    """What to raise for an argument that does not fit; for a sequence of objects it names the entry that is none."""
+    hint = _resolved(hint)
+    parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+    for part in parts:
+        kind = get_origin(part)
+        if inspect.isclass(kind) and issubclass(kind, Sequence) and isinstance(value, list | tuple):
+            for i, entry in enumerate(value):
+                if not _fits(entry, get_args(part)[0]):
+                    return Refused(f"{name}[{i}]", entry, _words(get_args(part)[0]))
+    return Refused(name, value, _words(hint))
 
 
 def _is_array(value: Any, parts: tuple[Any, ...]) -> bool:

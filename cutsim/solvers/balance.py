@@ -91,7 +91,7 @@ class Balance(Generic[T, H]):
         self._constraints.check(state.time)
         v = ufl.TestFunction(unknown.function_space)
         self.problem = NonlinearProblem(
-            sum((t.residual(v) for t in terms), start=ufl.Form([])),
+            sum((_residual(t, v) for t in terms), start=ufl.Form([])),
             unknown,
             bcs=[h.bc for h in held if h.bc is not None],
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},
@@ -172,3 +172,15 @@ class Balance(Generic[T, H]):
         forces: NDArray[np.float64] = residual.array_r.copy()
         residual.destroy()
         return forces
+
+
+def _residual(term: Term, v: Expr) -> ufl.Form:
+    """Virtual work of a term.
+
+    Raises:
+        ValueError: It has written something else, such as nothing.
+    """
+    written = term.residual(v)
+    valid = isinstance(written, ufl.Form)
+    require(f"residual of {term.name!r}", written, valid, "a ufl.Form, its virtual work; ufl.Form([]) if there is none")
+    return written
