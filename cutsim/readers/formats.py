@@ -3,11 +3,12 @@
 from pathlib import Path
 
 from cutsim.readers import gmsh_model
+from cutsim.readers.abaqus import read_abaqus
 from cutsim.readers.febio import read_febio
 from cutsim.readers.mesh_data import MeshData
 from cutsim.readers.meshio_files import read_meshio
 
-_READERS = {".feb": read_febio}
+_READERS = {".feb": read_febio, ".inp": read_abaqus}
 
 
 def load(path: Path | str, gdim: int) -> MeshData:

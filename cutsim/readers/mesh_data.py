@@ -81,6 +81,11 @@ class Numbering:
         """Which numbers are there."""
         return np.isin(wanted, self._sorted)
 
+    def within(self, numbers: range) -> Indices:
+        """Where those are that are in a range."""
+        inside = (self._sorted >= numbers.start) & (self._sorted < numbers.stop)
+        return self._first[inside & ((self._sorted - numbers.start) % numbers.step == 0)]
+
     def rows(self, wanted: Indices) -> Indices:
         """Where some numbers are.
 

@@ -11,6 +11,8 @@ import numpy as np
 from cutsim.readers.mesh_data import Block, Floats, Indices, MeshData, add_set
 from cutsim.readers.shapes import dimension
 
+# meshes of more cells than this have no group for each cell
+_FEW = 100
 # integers on cells that are no groups
 _NO_GROUPS = ("gmsh:geometrical", "vtkGhostType", "vtkOriginalCellIds", "vtkOriginalPointIds")
 
@@ -76,8 +78,8 @@ def _groups(mesh: meshio.Mesh) -> Iterator[tuple[str, list[Indices]]]:
         if name in _NO_GROUPS or not all(own.dtype.kind in "iu" and own.ndim == 1 for own in arrays):
             continue
         found = np.unique(np.concatenate(arrays))
-        if 1 < sum(map(len, arrays)) == len(found):
-            continue  # the number of each cell
+        if _FEW < sum(map(len, arrays)) == len(found):
+            continue  # each cell has a number of its own
         for value in found:
             labels = [named.get((int(value), dimension(block.type)), f"{name} {value}") for block in mesh.cells]
             for label in dict.fromkeys(labels):

@@ -68,6 +68,8 @@ def make_model(data: MeshData, choice: Choice) -> Model:
             mesh.
     """
     selection = Selection(data, choice.gdim, choice.only)
+    if lower := selection.lower():
+        logger.warning("left out: %s, which are neither cells nor facets", lower)
     shape, nodes, points = shapes.completed(selection.shape, selection.nodes, choice.scale * data.points)
     cell, degree, _ = shapes.USABLE[shape]
     nodes = shapes.in_order_of_dolfinx(shape, nodes)
@@ -109,22 +111,22 @@ class _Sets:
 
     def facets(self) -> dict[str, Indices]:
         """Corners of the facets of each set: of facets, of elements that are facets, and of nodes."""
-        distinct, lost, found = self._table.distinct, self._selection.lost, dict[str, Indices]()
+        distinct, left, found = self._table.distinct, self._selection.left, dict[str, Indices]()
         for name, arrays in self._data.facet_sets.items():
-            kept = [rows[~lost[rows].any(axis=1)] for rows in arrays]
+            # facets of elements that are no cells are not missed
+            kept = [rows[facets_among(self._number[rows], distinct) | ~left[rows].all(axis=1)] for rows in arrays]
             kept = [rows for rows in kept if len(rows)]
-            if kept or not any(map(len, arrays)):
+            if kept:
                 found[name] = check_members(name, self._number, kept, self._points, distinct, self._data.advice)
             else:
-                logger.warning("group %r is left out: its facets are those of elements that are no cells", name)
+                logger.warning("group %r is left out: it has no facets of cells of the mesh", name)
         for name, members in self._data.cell_sets.items():
-            faces = self._selection.faces(members)
-            if any(facets_among(self._number[rows], distinct).any() for rows in faces) and name not in found:
-                found[name] = check_members(name, self._number, faces, self._points, distinct, self._data.advice)
-            elif faces:
-                logger.warning(
-                    "%d elements of %r are left out: they are no facets of cells", sum(map(len, faces)), name
-                )
+            faces = [self._number[rows] for rows in self._selection.faces(members)]
+            known = sum(int(facets_among(rows, distinct).sum()) for rows in faces)
+            if known < (total := sum(map(len, faces))):
+                logger.warning("group %r is left out: %d of %d elements are facets of cells", name, known, total)
+            elif known and name not in found:
+                found[name] = np.concatenate(faces)
         for name, nodes in self._data.node_sets.items():
             if name not in found and len(rows := self._table.within(self._among(nodes))):
                 found[name] = rows

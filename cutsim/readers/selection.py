@@ -49,12 +49,11 @@ class Selection:
         self.parts = Parts({name: cells for name, cells in groups.items() if len(cells)}, len(self.nodes))
 
     @property
-    def lost(self) -> NDArray[np.bool_]:
-        """Nodes of elements that are no cells, but of none that is one."""
+    def left(self) -> NDArray[np.bool_]:
+        """Nodes of the file that elements have which are no cells."""
         left = np.zeros(len(self._data.points), dtype=bool)
         for block, start in zip(self._data.blocks, self._starts, strict=False):
             left[block.nodes[~self._chosen[start : start + len(block.nodes)]]] = True
-        left[self.nodes] = False
         return left
 
     def faces(self, members: Indices) -> list[Indices]:
@@ -67,7 +66,7 @@ class Selection:
             found.append(shapes.corners(block.shape, block.nodes[own]))
         return found
 
-    def lines(self) -> str:
+    def lower(self) -> str:
         """How many elements of which type are too low in dimension to be facets, in words."""
         return self._words(self._dims < self._gdim - 1)
 
@@ -87,7 +86,9 @@ class Selection:
         """Refuse elements of a type that cannot be used, or of several types."""
         if not self._chosen.any():
             found = self._words(np.ones(len(self._dims), dtype=bool))
-            raise ValueError(f"gdim = {self._gdim}, but the file has no cells of this dimension, it has {found}")
+            raise ValueError(
+                f"gdim = {self._gdim}, but the file has no cells of this dimension, it has {found or 'none'}"
+            )
         used = {self._data.blocks[number].shape for number in np.unique(self._block[self._chosen])}
         for shape in used:
             if not shapes.usable(shape):

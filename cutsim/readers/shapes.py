@@ -32,6 +32,12 @@ _DIMENSIONS = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3,
 _OF_FEBIO = {"tri": 2, "tet": 3, "pyra": 3}
 
 
+def count_of(shape: str) -> int:
+    """Number of nodes of a cell or facet."""
+    linear = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
+    return linear.get(shape) or int(shape.lstrip("abcdefghijklmnopqrstuvwxyz"))
+
+
 def dimension(shape: str) -> int:
     """Dimension of a cell; 0 of what is no curve, face or volume."""
     plain = shape.rstrip("0123456789")
