@@ -239,6 +239,36 @@ def test_settings_change_entries_of_lists(written):
     assert case.bodies["lower"].material.moduli == (7, 2000)
 
 
+def test_tables_for_a_first_try(written):
+    """They take part where this is asked for, and are checked always."""
+    path = written(BLADE + "[quick.tool]\nfriction = 0.3\n[quick.insertion]\ndepth = 1.0\n")
+    assert read_case(path).insertion.depth == 3 and "quick" in read_case(path).text
+    case = read_case(path, {"insertion.depth": "2"}, quick=True)
+    assert case.insertion.depth == 2 and case.tools["tool"].friction == 0.3 and "quick" not in case.text
+    path = written(BLADE + "[quick.tool]\nfrition = 0.3\n")
+    assert [problem.split(", must")[0] for problem in refused(path)] == [
+        "case.toml:33: quick.tool.frition: unknown key"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "words"),
+    [
+        ("tool.frictoin", "0.3", "tool.frictoin: unknown key, must be one of"),
+        ("title.x", "3", "title: {x}: must be a text in quotes"),
+        ("mesh", "3", "mesh: 3: must be a table"),
+        ("a..b", "1", "a: unknown key"),
+        ("", "1", "unknown key"),
+        ("tool.push.7", "1", "tool.push: {7}: must be a list in brackets"),
+        ("tools.blade.shape", "ball", "tools.blade.radius: missing"),
+        ("steps.first", "1 m\n ", "steps.first: '1 m\\n ': must be a number [s]"),
+    ],
+)
+def test_settings_that_are_refused(written, key, text, words):
+    line = " ".join(f"--set {key}={text}: {words}".splitlines())
+    assert any(problem.startswith(line) for problem in refused(written(BLADE), {key: text}))
+
+
 # ---- units and expressions
 
 

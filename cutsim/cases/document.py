@@ -117,7 +117,8 @@ class Document:
     def problem(self, keys: Keys, words: str, value: Any = None) -> str:
         """One line on what is wrong with a value."""
         place, key = self.origin(keys)
-        return ": ".join(filter(None, [place, key, "" if value is None else _short(value), words]))
+        line = ": ".join(filter(None, [place, key, "" if value is None else _short(value), words]))
+        return " ".join(line.splitlines())
 
     def hurried(self) -> "Document":
         """This document with its tables in ``[quick]``, which win."""
@@ -126,7 +127,7 @@ class Document:
         if not isinstance(quick, Mapping):
             return self
         start = ("quick",)
-        origins = {keys[1:]: origin for keys, origin in self.origins.items() if keys[:1] == start and keys != start}
+        origins = {full(keys[1:]): origin for keys, origin in self.origins.items() if keys[:1] == start != keys}
         return Document(tables, self.origins).changed(Document(_unfold(quick), origins))
 
     def changed(self, other: "Document") -> "Document":

@@ -52,6 +52,18 @@ def check_groups(case: Case, groups: Collection[str]) -> None:
 
 
 def _checked(document: Document, groups: Collection[str] | None = None) -> Case:
+    """The case of a document; what is wrong in its tables for a first try is said as well."""
+    case, found = _validated(document, groups)
+    if "quick" in document.tables:
+        found += _validated(document.hurried(), groups)[1]
+    if found or case is None:
+        raise CaseError(list(dict.fromkeys(found)))
+    case._document = document
+    return case
+
+
+def _validated(document: Document, groups: Collection[str] | None) -> tuple[Case | None, list[str]]:
+    """The case of a document, None if that is not valid, and all that is wrong."""
     scope = _scope(document, groups)
     case, found = None, list[str]()
     try:
@@ -61,11 +73,7 @@ def _checked(document: Document, groups: Collection[str] | None = None) -> Case:
     fields = Case.model_fields.items()
     absent = {k: f for k, f in fields if k not in document.tables and not f.is_required()}
     valid = {k: f.get_default(call_default_factory=True) for k, f in absent.items()} | scope.valid
-    found += [document.problem(keys, words, value) for keys, words, value in contradictions(valid)]
-    if found or case is None:
-        raise CaseError(list(dict.fromkeys(found)))
-    case._document = document
-    return case
+    return case, found + [document.problem(keys, words, value) for keys, words, value in contradictions(valid)]
 
 
 _UNITS: TypeAdapter[Units] = TypeAdapter(Annotated[Units, FromTable()])
