@@ -1,5 +1,8 @@
 """Built-in cases: each is read and begins to run; two give the numbers of the same problem in Python."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -111,3 +114,9 @@ def test_a_group_that_the_mesh_lacks_is_named():
     words = "supports.clamp.facets: 'front' is no group of facets of the mesh; it has crack, precrack, load_upper, "
     with pytest.raises(CaseError, match=words):
         case.build(COMM)
+
+
+def test_the_page_on_case_files_names_all():
+    page = (Path(__file__).parents[1] / "docs" / "case_files.md").read_text(encoding="utf-8")
+    section = page.partition("## Cases that come with cutsim")[2].partition("\n## ")[0]
+    assert set(re.findall(r"`([a-z-]+)`", section)) - {"extends"} == set(CASES)
