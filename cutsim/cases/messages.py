@@ -7,10 +7,10 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from cutsim.base.checks import Refused
+from cutsim.cases.docstrings import arguments_of
 from cutsim.cases.document import Document
 from cutsim.cases.keys import Keys, nearest
 from cutsim.cases.scope import Scope
-from cutsim.cases.tables import arguments_of
 
 _KINDS = ("model", "shape", "kind")
 _FORMS = {"<single>": "a text or a number", "<list>": "a list in brackets", "<table>": "a table"}

@@ -8,12 +8,12 @@ from pydantic import TypeAdapter, ValidationError
 
 from cutsim.base.units import Units
 from cutsim.cases.case import Case
+from cutsim.cases.constructed import FromTable
 from cutsim.cases.contradictions import contradictions
 from cutsim.cases.document import CaseError, Document, load, setting
 from cutsim.cases.messages import problems
 from cutsim.cases.quantities import consistent
 from cutsim.cases.scope import Scope
-from cutsim.cases.tables import FromTable
 
 
 def read_case(path: Path | str, changes: Mapping[str, str] | None = None, *, quick: bool = False) -> Case:

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator
 
 from cutsim.base.units import Units
+from cutsim.cases.constructed import FromTable
 from cutsim.cases.expressions import RESERVED
 from cutsim.cases.quantities import consistent
 from cutsim.cases.schema_heat import Heat
@@ -13,7 +14,7 @@ from cutsim.cases.schema_materials import AnyMaterial, Law
 from cutsim.cases.schema_mesh import Mesh, Selection
 from cutsim.cases.schema_parts import AnyTool, Body, Crack, Layer, Load, Pair, Support
 from cutsim.cases.schema_run import Analysis, AnyInsertion, Measure, Output, Solver, Steps
-from cutsim.cases.tables import Free, FromTable, Table
+from cutsim.cases.tables import Free, Table
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.materials.elastic import Material
 

@@ -5,9 +5,10 @@ from typing import Annotated, Literal
 from pydantic import Field, Tag
 
 from cutsim.base.units import Conductance, Conductivity, Density, SpecificHeat, TemperatureValue, Time
+from cutsim.cases.constructed import FromTable
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyName, CrackName, Groups, PairName, ToolName
-from cutsim.cases.tables import FORM, FromTable, Table, Varying, chosen_by
+from cutsim.cases.tables import FORM, Table, Varying, chosen_by
 from cutsim.heat.contact_heat import ContactHeat, HeatLaw
 
 Warmth = Annotated[TimeValue, Varying("temperature")]

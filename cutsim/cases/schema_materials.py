@@ -7,8 +7,8 @@ from pydantic import BeforeValidator, Discriminator, PrivateAttr, Tag, Validatio
 from pydantic_core import CoreSchema
 
 from cutsim.base.units import Kind, Units
+from cutsim.cases.constructed import Constructed, FromTable, annotated, choice, made
 from cutsim.cases.quantities import Converter
-from cutsim.cases.tables import Constructed, FromTable, annotated, choice, made
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw

@@ -5,10 +5,11 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, Viscosity
+from cutsim.cases.constructed import Constructed, FromTable, With
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
-from cutsim.cases.tables import FORM, Constructed, Flag, FromTable, Table, Varying, With, chosen_by
+from cutsim.cases.tables import FORM, Flag, Table, Varying, chosen_by
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.tools.pointed import Pointed

@@ -8,8 +8,9 @@ from pydantic_core import CoreSchema
 from cutsim.analysis.stepping import StepControl
 from cutsim.base.units import Length, Number, Time
 from cutsim.bodies.schemes import Newmark, Scheme
+from cutsim.cases.constructed import Constructed, FromTable, With, annotated, made, table_of
 from cutsim.cases.names import BodyName, CrackName, ToolName
-from cutsim.cases.tables import Constructed, Flag, FromTable, Table, Whole, With, annotated, made, table_of
+from cutsim.cases.tables import Flag, Table, Whole, chosen_by
 from cutsim.studies.drive import Drive
 from cutsim.studies.fixture import Fixture
 
@@ -137,7 +138,7 @@ class DomainIntegral(Table):
     length: Length | None = None
 
 
-Measure = Annotated[Front | DomainIntegral, Field(discriminator="kind")]
+Measure = Annotated[Front | DomainIntegral, Field(discriminator="kind"), chosen_by("kind", ["front", "j-integral"])]
 
 
 class Output(Table):
