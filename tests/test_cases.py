@@ -5,11 +5,13 @@ import pickle
 import random
 import re
 import tomllib
+from dataclasses import fields, is_dataclass
 
 import dolfinx.jit
 import gmsh
 import jsonschema
 import pytest
+from pydantic import TypeAdapter
 
 from cutsim import (
     AdiabaticTool,
@@ -24,16 +26,24 @@ from cutsim import (
     StepControl,
     ThermoElastic,
 )
+from cutsim.analysis.stepping import Control
 from cutsim.base.parameters import numbers
 from cutsim.base.units import Kind, Units
 from cutsim.cases import CaseError, built_in_cases, case_schema, check_groups, read_case
+from cutsim.cases.classes import FAMILIES, classes, kebab
+from cutsim.cases.constructed import family
 from cutsim.cases.document import File
 from cutsim.cases.expressions import evaluate
 from cutsim.cases.json_schema import kinds_in
 from cutsim.cases.quantities import Converter, split
 from cutsim.cases.schema_materials import in_units
+from cutsim.cases.scope import Scope
 from cutsim.fields import meshing
+from cutsim.interface.cohesive import CohesiveLaw
+from cutsim.materials.elastic import Material
 from cutsim.materials.library import LIBRARY
+from cutsim.tools.shapes import Shape
+from helpers.examples import CONTROLS, LAWS, MATERIALS, TOOLS
 
 BLADE = """
 title = "Blade cut of silicone"
@@ -196,6 +206,33 @@ def test_numbers_are_in_the_units_of_the_file(written):
     assert case.heat.tools["roller"].law == AdiabaticTool()
     assert case.analysis.scheme == GeneralisedAlpha(0.8)
     assert case.steps == StepControl.fixed(0.1)
+
+
+def as_table(item):
+    """What a case file says of an object of a class that cutsim exports."""
+    parts = {f.name: getattr(item, f.name) for f in fields(item) if getattr(item, f.name) is not None}
+    table = {n: as_table(v) if is_dataclass(v) else listed(v) if isinstance(v, tuple) else v for n, v in parts.items()}
+    keys = [FAMILIES[protocol] for protocol in FAMILIES if type(item) in classes(protocol).values()]
+    return table | {key: kebab(type(item).__name__) for key in keys}
+
+
+def listed(value):
+    return [listed(v) if isinstance(v, tuple) else as_table(v) if is_dataclass(v) else v for v in value]
+
+
+EXAMPLES = [
+    *((CohesiveLaw, bond.law) for bond in LAWS.values()), *((Shape, shape) for shape, _ in TOOLS.values()),
+    *((Material, material) for material in MATERIALS), *((Control, control) for control in CONTROLS.values()),
+]  # fmt: skip
+EXAMPLES = [(protocol, item) for protocol, item in EXAMPLES if type(item).__module__.startswith("cutsim.")]
+
+
+@pytest.mark.parametrize(("protocol", "item"), EXAMPLES, ids=[type(item).__name__ for _, item in EXAMPLES])
+def test_each_class_is_known_by_its_name(protocol, item):
+    table = as_table(item)
+    assert FAMILIES[protocol] in table
+    read = TypeAdapter(family(protocol)).validate_python(table, context=Scope({}, Units()))
+    assert type(read) is type(item) and numbers(read) == pytest.approx(numbers(item))
 
 
 def test_functions_of_time(written):

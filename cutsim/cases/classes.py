@@ -6,6 +6,7 @@ from dataclasses import is_dataclass
 from functools import cache
 
 import cutsim
+from cutsim.analysis.stepping import Control
 from cutsim.bodies.schemes import Scheme
 from cutsim.heat.contact_heat import HeatLaw
 from cutsim.interface.cohesive import CohesiveLaw
@@ -22,6 +23,7 @@ FAMILIES: Mapping[type, str] = {
     FrictionLaw: "model",
     HeatLaw: "model",
     Scheme: "model",
+    Control: "model",
     Shape: "shape",
 }
 

@@ -1,14 +1,17 @@
 """Schema of case files: the insertion of a tool, analysis, steps, solver and output."""
 
-from typing import Annotated, Any, Literal
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Discriminator, Field, Tag
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from pydantic_core import CoreSchema
 
-from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.stepping import Control, StepControl
+from cutsim.base.checks import positive, require_number
 from cutsim.base.units import Length, Number, Time
 from cutsim.bodies.schemes import Newmark, Scheme
-from cutsim.cases.constructed import Constructed, FromTable, With, annotated, made, table_of
+from cutsim.cases.constructed import Constructed, FromTable, With, annotated, choice, made, table_of
 from cutsim.cases.names import BodyName, CrackName, ToolName
 from cutsim.cases.tables import Flag, Table, Whole, chosen_by
 from cutsim.studies.drive import Drive
@@ -68,9 +71,11 @@ class FixedSteps(Constructed):
 
     fixed: Time
 
-    def model_post_init(self, context: Any) -> None:
-        """Make the control."""
+    @model_validator(mode="after")
+    def _make(self) -> Self:
+        require_number("fixed", self.fixed, positive)
         self._made = StepControl.fixed(self.fixed)
+        return self
 
 
 def _plain(value: Any) -> Any:
@@ -166,20 +171,21 @@ class Output(Table):
 
 
 class AnySteps:
-    """Annotation of a step control: the parameters of `StepControl`, or equal steps."""
+    """Annotation of a step control: the parameters of `StepControl`, equal steps, or another control by its name."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         """How it is read."""
-        fixed, control = made(FixedSteps), made(table_of(StepControl))
-        either = annotated(fixed, Tag("<fixed>")) | annotated(control, Tag("<control>"))
+        kinds = {"<fixed>": FixedSteps, "<control>": table_of(StepControl), "<model>": choice(Control)}
+        either = reduce(or_, (annotated(made(table), Tag(tag)) for tag, table in kinds.items()))
         schema: CoreSchema = handler.generate_schema(annotated(either, Discriminator(_steps)))
         return schema
 
 
 def _steps(value: Any) -> str:
-    return "<fixed>" if isinstance(value, dict) and "fixed" in value else "<control>"
+    keys = value if isinstance(value, dict) else ()
+    return "<fixed>" if "fixed" in keys else "<model>" if "model" in keys else "<control>"
 
 
 #: Insertion whose further keys are the parameters of a `Drive`.
 AnyInsertion = Annotated[Insertion, With(Drive)]
-Steps = Annotated[StepControl, AnySteps()]
+Steps = Annotated[Control, AnySteps()]
