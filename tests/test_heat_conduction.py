@@ -250,7 +250,8 @@ BAD = {
     "a scalar space": lambda b: Temperature(b.state, b.state.V, 300.0),
     "a HeatBody for every cell": lambda b: HeatTransfer(b.T, [HeatFlux(b.T, b.ends[0], 1.0)]),
     "4 nodes have none": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY, body=b.left_half)]),
-    "different for all terms": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY), HeatBody(b.T, **BODY)]),
+    "share 4 cells": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY), HeatBody(b.T, **BODY, name="twin")]),
+    "different for all terms": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY), *[HeatFlux(b.T, b.ends[0], 1.0)] * 2]),
 }
 
 

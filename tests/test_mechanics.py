@@ -17,6 +17,9 @@ from cutsim.bodies.loads import Support, Traction
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
+from cutsim.fields.temperature import Temperature
+from cutsim.heat.conduction import HeatBody
+from cutsim.heat.transfer import HeatTransfer
 from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
@@ -282,3 +285,18 @@ def test_the_audit_of_a_loaded_state_begins_with_its_energy():
     held = first.audit.entries["strain"] + first.audit.entries["cohesive_stored"] + first.audit.entries["fracture"]
     assert rows[0]["energy_initial"][0] == pytest.approx(held, rel=1e-9) and held > 0.01
     assert max(abs(row["energy_closure"][0]) for row in rows) < 5e-3
+
+
+@pytest.mark.mpi
+def test_bodies_that_share_cells_are_refused():
+    """Their stiffness would count twice."""
+    b = make_blocks(n=4)
+    lower = b.solid(cells=b.lower, name="lower")
+    Mechanics(b.state, [lower, b.solid(cells=b.upper, name="upper")])
+    with pytest.raises(ValueError, match="bodies 'lower' and 'whole' share 8 cells: each cell belongs to one body"):
+        Mechanics(b.state, [lower, b.solid(name="whole")])
+    space = cracked_space(b.state.mesh, ("Lagrange", 1), b.facets)
+    T = Temperature(b.state, space, 293.0)
+    one = {"density": 1.0, "capacity": 1.0, "conductivity": 1.0}
+    with pytest.raises(ValueError, match="bodies 'all' and 'lower' share 8 cells"):
+        HeatTransfer(T, [HeatBody(T, **one, name="all"), HeatBody(T, **one, body=b.lower, name="lower")])

@@ -316,7 +316,7 @@ def test_refuses_a_time_in_the_past():
 def test_refuses_ambiguous_names():
     b = make_blocks()
     with pytest.raises(ValueError, match=r"names = .* is not allowed"):
-        Mechanics(b.state, [b.solid(), b.solid()])
+        Mechanics(b.state, [b.solid(cells=b.lower), b.solid(cells=b.upper)])
     with pytest.raises(ValueError, match="terms = 0 is not allowed"):
         Mechanics(b.state, [])
     assert isinstance(b.solid().residual(ufl.TestFunction(b.state.V)), ufl.Form)

@@ -36,6 +36,7 @@ from cutsim.base.verdict import CLOSURE
 from cutsim.bodies.inertia import Inertia
 from cutsim.bodies.loads import Support
 from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
+from cutsim.fields.cells import check_disjoint
 from cutsim.fields.crack_checks import check_cracks
 from cutsim.fields.state import State
 from cutsim.fields.twins import unjoined
@@ -79,8 +80,8 @@ class Mechanics(Balance[Term, Support]):
         motion: What a dynamic analysis adds.
 
     Raises:
-        ValueError: There is no term, two terms or supports share a name, two supports prescribe different displacements
-            of one node, or a dynamic analysis has no solid or one without density.
+        ValueError: There is no term, two terms or supports share a name, two solids share a cell, two supports
+            prescribe different displacements of one node, or a dynamic analysis has no solid or one without density.
     """
 
     @checked
@@ -105,6 +106,7 @@ class Mechanics(Balance[Term, Support]):
         if analysis == "dynamic":
             self.motion = Dynamic(Inertia(state, offering(terms, Body), scheme, mass), terms, supports)
         interfaces, size = offering(terms, Interface), extent(state.mesh.comm, state.mesh.geometry.x)
+        check_disjoint(state.mesh, offering(terms, Body))
         check_cracks(state, offering(terms, Bonded))
         super().__init__(
             "mechanics",

@@ -1,8 +1,13 @@
-"""Checks of cells: without volume, folded, or overlapping."""
+"""Checks of cells: without volume, folded, lying over each other, or belonging to two bodies."""
+
+from collections.abc import Sequence
+from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 from dolfinx.mesh import Mesh, compute_midpoints, entities_to_geometry
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from cutsim.base.arrays import Array
 from cutsim.base.checks import place
@@ -10,6 +15,18 @@ from cutsim.base.compat import geometry_nodes
 
 # determinant of the Jacobian over the product of the lengths of its columns that counts as none
 _NOTHING = 1e-10
+
+
+class Filling(Protocol):
+    """Protocol of a body that fills cells.
+
+    Attributes:
+        name: Its name.
+        cells: Local cells (ghosts allowed); None for all.
+    """
+
+    name: str
+    cells: NDArray[np.int32] | None
 
 
 def check_cells(mesh: Mesh) -> None:
@@ -33,6 +50,27 @@ def check_cells(mesh: Mesh) -> None:
     folded = (volume.min(axis=1, initial=np.inf) < -_NOTHING) & (volume.max(axis=1, initial=-np.inf) > _NOTHING)
     _refuse(mesh.comm, places[folded], "cells are folded (their Jacobian changes its sign)")
     _refuse(mesh.comm, _overlapping(mesh), "facets have both their cells on the same side: cells lie over each other")
+
+
+def check_disjoint(mesh: Mesh, bodies: Sequence[Filling]) -> None:
+    """Refuse bodies that share cells, since their stiffnesses, masses and capacities would add up. Collective.
+
+    Args:
+        mesh: The mesh.
+        bodies: The bodies.
+
+    Raises:
+        ValueError: On all ranks, with the names of the first two and the number of cells that they share.
+    """
+    owned = np.arange(mesh.topology.index_map(mesh.topology.dim).size_local)
+    parts = [owned if body.cells is None else np.intersect1d(body.cells, owned) for body in bodies]
+    for i, j in combinations(range(len(bodies)), 2):
+        shared = mesh.comm.allreduce(len(np.intersect1d(parts[i], parts[j])))
+        if shared:
+            raise ValueError(
+                f"bodies {bodies[i].name!r} and {bodies[j].name!r} share {shared} cells: each cell belongs to one body "
+                "(without cells a body has all of them)"
+            )
 
 
 def _refuse(comm: MPI.Comm, places: Array, what: str) -> None:

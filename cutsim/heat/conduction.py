@@ -43,6 +43,7 @@ class HeatBody(HeatTerm):
         name: Name in messages and output.
 
     Attributes:
+        cells: Its local cells (ghosts included); None for all.
         dofs: Local dofs of the temperature in the body.
 
     Raises:
@@ -86,7 +87,7 @@ class HeatBody(HeatTerm):
         self._volume = integrate(form(one * self._dx_storage))
         self._mean_form = form(temperature.value * self._dx_storage)
         self._stored_form = form(self._heat_capacity * (temperature.value - temperature.old) * self._dx_storage)
-        self.dofs = _dofs_of(temperature.space, cells)
+        self.cells, self.dofs = cells, _dofs_of(temperature.space, cells)
 
     @property
     def content(self) -> float:

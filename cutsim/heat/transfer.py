@@ -13,6 +13,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns, offering
 from cutsim.base.verdict import CLOSURE
+from cutsim.fields.cells import Filling, check_disjoint
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.audit import HeatAudit, HeatTerm
 from cutsim.heat.boundary import PrescribedTemperature
@@ -42,8 +43,8 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
         tolerances: When the heat flows balance.
 
     Raises:
-        ValueError: A node has no body, two terms or prescribed temperatures share a name, or two prescribe different
-            temperatures of one node.
+        ValueError: A node has no body, two bodies share a cell, two terms or prescribed temperatures share
+            a name, or two prescribe different temperatures of one node.
     """
 
     @checked
@@ -60,6 +61,7 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
         bodies = offering(terms, Storing)
         bare = _nodes_without(temperature, bodies)
         require("terms", [t.name for t in terms], bare == 0, f"a HeatBody for every cell ({bare} nodes have none)")
+        check_disjoint(temperature.state.mesh, bodies)
         super().__init__(
             "heat",
             temperature.state,
@@ -138,8 +140,8 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
 
 
 @runtime_checkable
-class Storing(Protocol):
-    """Protocol of a term that gives unknowns their heat capacity.
+class Storing(Filling, Protocol):
+    """Protocol of a body that gives unknowns their heat capacity.
 
     Attributes:
         dofs: Local dofs of the temperature that it has.
