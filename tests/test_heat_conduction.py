@@ -251,7 +251,7 @@ BAD = {
     "a HeatBody for every cell": lambda b: HeatTransfer(b.T, [HeatFlux(b.T, b.ends[0], 1.0)]),
     "4 nodes have none": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY, body=b.left_half)]),
     "share 4 cells": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY), HeatBody(b.T, **BODY, name="twin")]),
-    "different for all terms": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY), *[HeatFlux(b.T, b.ends[0], 1.0)] * 2]),
+    "different for all terms": lambda b: HeatTransfer(b.T, [HeatBody(b.T, **BODY), *2 * [HeatFlux(b.T, b.ends[0], 1)]]),
 }
 
 
