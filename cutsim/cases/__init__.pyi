@@ -1,6 +1,8 @@
 from .built_in import built_in_cases as built_in_cases
 from .case import Case as Case
 from .document import CaseError as CaseError
+from .importing.draft import Imported as Imported
+from .importing.model_files import import_model as import_model
 from .json_schema import case_schema as case_schema
 from .reading import check_groups as check_groups
 from .reading import read_case as read_case
