@@ -51,6 +51,13 @@ def test_units_compose():
         Units().of("colour")
 
 
+def test_units_of_a_plane_problem_are_per_width():
+    units = Units().per_width()
+    kinds = ("force", "energy", "moment", "power", "entropy", "stress", "length", "toughness")
+    symbols = "N/mm mJ/mm N·mm/mm mJ/(s·mm) mJ/(K·mm) MPa mm N/mm".split()
+    assert [units.of(kind) for kind in kinds] == symbols
+
+
 @pytest.mark.mpi
 def test_history_round_trip_is_exact(folder):
     rows = [{"step": i, "time": 0.1 * i, "depth": math.pi * i, "force_y": -1e-300 / 3 * i} for i in range(4)]

@@ -50,6 +50,8 @@ KINDS = tuple(DIMENSIONS)
 
 _STRESS = {("mm", "N"): "MPa", ("m", "N"): "Pa", ("mm", "kN"): "GPa", ("m", "kN"): "kPa"}
 _ENERGY = {("mm", "N"): "mJ", ("m", "N"): "J", ("mm", "kN"): "J", ("m", "kN"): "kJ"}
+# what is per width in a plane problem
+_EXTENSIVE = ("force", "energy", "moment", "power", "entropy")
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -173,3 +175,20 @@ class Units:
         """
         symbol = self.of(kind)
         return name if kind == "one" else f"{name} [{symbol}]"
+
+    def per_width(self) -> PlaneUnits:
+        """The units of plane problems, in which forces and energies are per width."""
+        return PlaneUnits(self.length, self.force, self.time, self.temperature)
+
+
+@dataclass(frozen=True)
+class PlaneUnits(Units):
+    """A consistent set of units for a plane problem: forces, energies and what follows from them are per width."""
+
+    def of(self, kind: str) -> str:
+        """Symbol of the unit of a kind of quantity; see `Units.of`."""
+        symbol = super().of(kind)
+        if kind not in _EXTENSIVE:
+            return symbol
+        above, slash, below = symbol.partition("/")
+        return f"{above}/({below}·{self.length})" if slash else f"{symbol}/{self.length}"

@@ -42,7 +42,7 @@ class Recording:
         problem: The problem.
         until: Time at which the run ends.
         title: What is running, in a word or two, for the progress bar.
-        units: Units of the history's header.
+        units: Units of the history's header; in a plane problem forces and energies are per width.
         show: Label → column, for the progress bar.
         extra: Further columns, computed from those of the step on all ranks.
         derived: Name → UFL expression of fields such as stress.
@@ -78,7 +78,7 @@ class Recording:
         quiet: bool = False,
     ) -> None:
         require_number("every", every, nonnegative)
-        self.folder, self.problem, self._units = Path(folder), problem, units or Units()
+        self.folder, self.problem, self._units = Path(folder), problem, _units(problem, units)
         self._title, self._until, self._values = title, until, dict[str, Any]()
         self._show, self._extra = dict(show or {}), extra
         self._checkpoints, self._stack = checkpoints, ExitStack()
@@ -198,6 +198,11 @@ class Recording:
         if together or state.mesh.comm.rank == 0:
             write_summary(self.folder / "summary.json", self._summary(), summary)
         self._progress.say(f"{self._title}: {state.verdict}")
+
+
+def _units(problem: Problem, units: Units | None) -> Units:
+    units, state = units or Units(), problem.state
+    return units.per_width() if state.mesh.geometry.dim == 2 and not state.axisymmetric else units
 
 
 class _FieldFiles:
