@@ -11,13 +11,17 @@ import pyvista
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
+from cutsim.analysis.mechanics import Mechanics
 from cutsim.base.compat import cell_partitioner
+from cutsim.bodies.loads import Support, Traction
 from cutsim.fields.space import cracked_space
-from cutsim.results import grids, pictures, plots
+from cutsim.results import grids, pictures, plots, setup_picture
 from cutsim.results.grids import gather_facets, gather_grid
-from cutsim.results.pictures import draw_body
-from cutsim.results.plots import COLOURS, Curve, plot_curves, plot_energy, plot_parts
+from cutsim.results.pictures import draw_body, save
+from cutsim.results.plots import COLOURS, Curve, distinct, plot_curves, plot_energy, plot_parts
+from cutsim.results.setup_picture import draw_setup
 from cutsim.results.tool_surfaces import revolved
+from helpers.blocks import make_blocks
 
 SHAPES = ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
 
@@ -98,22 +102,74 @@ def test_body_is_drawn(folder, shape):
     assert np.any(colours(folder / "new" / "all.png")[0] != plain)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {"clip": ((1, 0, 0), (0.5, 0, 0))},
-        {"mirror": "xy"},
-        {"window": (0, 0.2, 0, 0.2, 0, 0)},
-        {"title": "t"},
-    ],
-)
-def test_options_change_the_picture(tmp_path, options):
+@pytest.mark.mpi
+def test_setup_is_drawn_with_all_that_has_a_name(folder, monkeypatch):
+    b, seen = make_blocks(), []
+    monkeypatch.setattr(setup_picture, "save", lambda figure, path: (seen.append(figure), save(figure, path)))
+    facets, right = b.face(1, 1.0), b.face(0, 1.0)
+    pull = Traction(b.state, right, (1.0, 0.0), lambda t: t, name="wind")
+    supports = [Support(b.state, facets, 1, name="lid"), Support(b.state, b.face(1, 0.0), 0)]
+    problem = Mechanics(b.state, [b.solid(name="cake"), b.crack(name="cut"), pull], supports)
+    draw_setup(folder / "setup.png", problem, supports)
+    if MPI.COMM_WORLD.rank > 0:
+        assert not seen
+        return
+    names = [text.get_text() for text in seen[0].legends[0].get_texts()]
+    assert names == ["cake", "cut", "lid: $u_y$", "held: $u_x$", "wind"]
+    pixels = colours(folder / "setup.png")[0]
+    for colour in distinct(5)[1:]:
+        assert np.any(np.abs(pixels[:850] - matplotlib.colors.to_rgb(colour)).max(axis=2) < 0.03)
+
+
+@pytest.mark.parametrize("names", [(), ("low", "high")])
+def test_bars_are_those_of_what_there_is(tmp_path, names, monkeypatch):
+    """Layers have a legend of their names, stresses and damage a bar; there is none of damage where nothing is."""
+    seen = []
+    monkeypatch.setattr(pictures, "save", lambda figure, path: seen.append(figure))
+    u, height, facets, damage = torn("quadrilateral", 1)
+    grid = gather_grid(u, {"height": np.round(height.x.array)})
+    for broken in (damage, 0 * damage):
+        draw_body("none.png", grid, "height", label="$σ_v$ [MPa]", crack=gather_facets(u, facets, broken), names=names)
+    titles = [[axes.get_title() for axes in figure.axes[1:]] for figure in seen]
+    legends = [[text.get_text() for legend in figure.legends for text in legend.get_texts()] for figure in seen]
+    assert titles == ([[], []] if names else [["$σ_v$ [MPa]", "damage of the crack"], ["$σ_v$ [MPa]"]])
+    assert legends == [list(names), list(names)]
+
+
+def test_scale_is_true(tmp_path):
+    """The bar of the scale is as long as a part of the body of that length."""
+    grid = pyvista.ImageData(dimensions=(5, 3, 1), spacing=(0.75, 0.5, 1.0)).cast_to_unstructured_grid()
+    grid["u"] = np.zeros((grid.n_points, 3))
+    grid.cell_data["s"] = np.arange(grid.n_cells, dtype=float)
+    draw_body(tmp_path / "scale.png", grid, "s", label="s", length="cm")
+    pixels = colours(tmp_path / "scale.png")[0]
+    body = np.flatnonzero(np.any(pixels[:850] < 0.9, axis=(0, 2)))
+    bar = np.flatnonzero(np.all(pixels[905:945, 1200:] < 0.1, axis=2).any(axis=0))
+    assert (bar[-1] - bar[0]) / (body[-1] - body[0]) == pytest.approx(0.5 / 3.0, rel=0.02)
+
+
+@pytest.mark.parametrize("suffix", ["svg", "pdf"])
+def test_pictures_and_plots_have_letters_as_vectors(tmp_path, suffix):
+    u, height, *_ = torn("quadrilateral", 1)
+    draw_body(tmp_path / f"a.{suffix}", gather_grid(u, {"height": height}), "height", label="σ [mm]")
+    assert (tmp_path / f"a.{suffix}").read_bytes()[:5] in (b"<?xml", b"%PDF-")
+
+
+def test_no_two_curves_have_one_colour():
+    for count in (1, 7, 8, 30):
+        assert len(set(distinct(count))) == count
+
+
+def test_options_change_the_picture(tmp_path):
     u, height, facets, damage = torn("hexahedron", 1)
     grid, crack = gather_grid(u, {"height": height}), gather_facets(u, facets, damage)
     draw_body(tmp_path / "plain.png", grid, "height", label="height [mm]", crack=crack)
-    draw_body(tmp_path / "other.png", grid, "height", label="height [mm]", crack=crack, **options)
-    plain, other = (colours(tmp_path / name) for name in ("plain.png", "other.png"))
-    assert other[1] > 0.05 and np.any(other[0] != plain[0])
+    plain = colours(tmp_path / "plain.png")[0]
+    window = (0, 0.2, 0, 0.2, 0, 0)
+    for options in ({"clip": ((1, 0, 0), (0.5, 0, 0))}, {"mirror": "xy"}, {"window": window}, {"title": "t"}):
+        draw_body(tmp_path / "other.png", grid, "height", label="height [mm]", crack=crack, **options)
+        other, filled = colours(tmp_path / "other.png")
+        assert filled > 0.05 and np.any(other != plain), options
 
 
 def test_view_fills_the_stage(tmp_path):

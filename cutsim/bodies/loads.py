@@ -197,6 +197,7 @@ class SurfaceLoad(Load):
         corners: tuple[float, ...],
     ) -> None:
         super().__init__(state, factor, parameter, name, corners)
+        self.nodes = locate_dofs(state.V, state.mesh.topology.dim - 1, facets)
         self._ds = state.measures.exterior(facets)
         self._scale = self._factor.constant
         self._form = form(self.residual(ufl.TestFunction(state.V)))
@@ -330,8 +331,8 @@ class NodalForce(Load):
         gdim = state.mesh.geometry.dim
         require_numbers("direction", direction, length=gdim)
         super().__init__(state, factor, "factor", name, corners)
-        nodes = locate_dofs(state.V, 0, vertices)
-        nodes = nodes[nodes < state.V.dofmap.index_map.size_local]
+        self.nodes = locate_dofs(state.V, 0, vertices)
+        nodes = self.nodes[self.nodes < state.V.dofmap.index_map.size_local]
         found = state.mesh.comm.allreduce(len(nodes))
         require("vertices", found, found > 0, f"vertices that carry dofs (load {name!r})")
         self._dofs = (gdim * nodes[:, None] + np.arange(gdim, dtype=np.int32)).ravel()

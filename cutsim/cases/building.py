@@ -26,9 +26,9 @@ from cutsim.cases.measures import Measure, measures, tool_measures
 from cutsim.cases.parts import Parts
 from cutsim.cases.refusals import refused, refusing
 from cutsim.cases.schema import CaseTables
-from cutsim.cases.setup import draw_setup
 from cutsim.cases.tools import tools
 from cutsim.fields.meshing import TaggedMesh
+from cutsim.results.setup_picture import draw_setup
 from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.insertion import Insertion
 
@@ -87,7 +87,7 @@ class Simulation:
         Args:
             path: The PNG, PDF or SVG; folders are made.
         """
-        draw_setup(path, self.mechanics, self.units)
+        draw_setup(path, self.problem, self.mechanics.supports, self.units)
 
     def run(self, record: Recorder) -> None:
         """Run to the end, from the committed time on. Collective.

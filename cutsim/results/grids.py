@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import require
 from cutsim.base.compat import nodal_expression
 from cutsim.bodies.solid import Solid
+from cutsim.fields.state import State
 
 if TYPE_CHECKING:
     import pyvista
@@ -86,6 +87,20 @@ def gather_facets(
     middle = nodes[space.dofmap.list[cells]].mean(axis=1)
     data = {"damage": np.tile(np.asarray(damage)[owned], 2), "middle": middle}
     return _assemble(mesh.comm, table, np.full(len(table), kind), nodes[dofs.ravel()], {"u": values}, data)
+
+
+def part_numbers(state: State, solids: Sequence[Solid]) -> fem.Function:
+    """Number of the solid that each cell belongs to.
+
+    Args:
+        state: Displacement and time.
+        solids: The solids.
+    """
+    number = fem.Function(fem.functionspace(state.mesh, ("DG", 0)))
+    for index, solid in enumerate(solids):
+        cells = slice(None) if solid.cells is None else solid.cells
+        number.x.array[number.function_space.dofmap.list[cells, 0]] = index
+    return number
 
 
 class VonMises:

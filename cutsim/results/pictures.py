@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import Colormap, ListedColormap
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -23,8 +23,8 @@ from cutsim.base.checks import require
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
 from cutsim.results.grids import VonMises, gather_facets, gather_grid
-from cutsim.results.scene import DAMAGE, STRESS, Scene, View, corners, sharp_edges
-from cutsim.results.sheet import SCENE, SIZE, Bar, compose
+from cutsim.results.scene import ASIDE, DAMAGE, STRESS, Scene, View, corners, sharp_edges
+from cutsim.results.sheet import SCENE, SIZE, Bar, Entry, compose
 from cutsim.results.stages import Skin, Stage
 
 if TYPE_CHECKING:
@@ -35,8 +35,6 @@ logger = logging.getLogger(__name__)
 #: Colours of the parts of a body; more of them are told apart by a ramp.
 PARTS = ("#9ecae1", "#fdd0a2", "#c7e9c0", "#dadaeb", "#f7c6c7", "#e2d3b5", "#c2e5e5", "#e6e6a8")
 
-#: From where a body in space is looked at: to the right, up, in front.
-ASIDE = np.array([1.0, 0.7, 1.6])
 # damage below which a crack counts as intact
 _INTACT = 1e-3
 # pixels per inch
@@ -55,22 +53,23 @@ class _Content:
     tool: pyvista.PolyData | None
     flat: bool
     edges: bool = False
+    names: Sequence[str] = ()
 
     def figure(self, view: View, *, title: str, length: str, dpi: int) -> Figure:
         """The picture."""
         width, height = (round(dpi * inch) for inch in SIZE)
-        bars = [self.bar]
+        bars = [] if self.names else [self.bar]
         with Scene((width, round(SCENE * height)), flat=self.flat) as scene:
             scene.add_body(self.body, self.scalars, self.bar.colours, self.bar.limits, edges=self.edges)
             scene.add_lines(self.lines)
             if self.crack is not None and self.crack.n_cells:
                 scene.add_crack(self.crack)
-                if self.crack["damage"].max() > _INTACT:
+                if not self.names and self.crack["damage"].max() > _INTACT:
                     bars.append(Bar("damage of the crack", DAMAGE, (0.0, 1.0)))
             if self.tool is not None:
                 scene.add_tool(self.tool)
             pixels, seen = scene.shot(view)
-        return compose(pixels, seen, bars, title=title, length=length)
+        return compose(pixels, seen, bars, part_entries(self.names), title=title, length=length)
 
 
 def draw_body(
@@ -127,16 +126,19 @@ def draw_body(
         flat = not np.ptp(grid.points[:, 2])
         body = _deformed(grid, mirror, clip)
         surface, linear = _surface(body, averaged=not names), bool(body.celltypes.max() < 15)  # VTK's first order
+        bar = Bar(label, STRESS, limits or _range(body.cell_data[scalars]))
+        if names:
+            bar = Bar("", ListedColormap(part_colours(len(names))), (-0.5, len(names) - 0.5))
         content = _Content(
-            surface, scalars, _bar(label, body.cell_data[scalars], limits, names), sharp_edges(surface, mirror),
-            None if crack is None else _deformed(crack, mirror, clip), tool, flat, edges=linear,
+            surface, scalars, bar, sharp_edges(surface, mirror),
+            None if crack is None else _deformed(crack, mirror, clip), tool, flat, edges=linear, names=names,
         )  # fmt: skip
         shown = corners(window) if window else np.vstack([mesh.points for mesh in (body, tool) if mesh])
-        fine = _fine(path)
+        fine = pixels_per_inch(path)
         figure = content.figure(
             View(shown, (0.0, 0.0, 1.0) if flat else view, up), title=title, length=length, dpi=fine
         )
-        _save(figure, path)
+        save(figure, path)
     except Exception as error:  # a picture is never worth a run
         logger.warning("%s was not drawn: %s", path, error)
 
@@ -215,26 +217,40 @@ def draw_stress(path: Path | str, solids: Solid | Sequence[Solid], crack: Crack 
     draw_body(path, grid, "stress", crack=faces, **{"label": "von Mises stress [MPa]", **view})
 
 
-def _bar(label: str, values: NDArray[np.float64], limits: tuple[float, float] | None, names: Sequence[str]) -> Bar:
-    if names:
-        return Bar(label, part_colours(len(names)), (-0.5, len(names) - 0.5), names)
-    return Bar(label, STRESS, limits or _range(values))
-
-
-def part_colours(count: int) -> Colormap:
+def part_colours(count: int) -> list[Any]:
     """Colours of the parts of a body.
 
     Args:
         count: Number of parts.
     """
-    return ListedColormap(PARTS[:count]) if count <= len(PARTS) else colormaps["YlGnBu"].resampled(count)
+    return list(PARTS[:count]) if count <= len(PARTS) else list(colormaps["YlGnBu"](np.linspace(0.05, 0.95, count)))
 
 
-def _fine(path: Path | str) -> int:
+def part_entries(names: Sequence[str]) -> list[Entry]:
+    """Legend of the parts of a body.
+
+    Args:
+        names: Their names.
+    """
+    return [Entry(name, colour) for name, colour in zip(names, part_colours(len(names)), strict=True)]
+
+
+def pixels_per_inch(path: Path | str) -> int:
+    """Resolution of the body in a picture.
+
+    Args:
+        path: The picture.
+    """
     return _FINE if Path(path).suffix == ".png" else 2 * _FINE
 
 
-def _save(figure: Figure, path: Path | str) -> None:
+def save(figure: Figure, path: Path | str) -> None:
+    """Save a picture.
+
+    Args:
+        figure: The picture.
+        path: The file; folders are made.
+    """
     Path(path).parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path)
 

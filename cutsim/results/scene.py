@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Colours of damage, from an intact bond to a broken one; apart from those of stress on either end.
 DAMAGE = LinearSegmentedColormap.from_list("damage", ["#f4ece6", "#f2a98a", "#c4302b", "#5a0012"])
+#: From where a body in space is looked at: to the right, up, in front.
+ASIDE = np.array([1.0, 0.7, 1.6])
 #: Colours of stress.
 STRESS = "viridis"
 
@@ -94,12 +96,13 @@ class Scene:
         limits: tuple[float, float],
         *,
         edges: bool = False,
+        opacity: float = 1.0,
     ) -> None:
-        """Add a body coloured by a field, with its sharp and outer edges."""
+        """Add a body coloured by a field, with or without the edges of its cells."""
         self._plotter.add_mesh(
             surface, scalars=scalars, cmap=colours, clim=limits, show_edges=edges, edge_color=_LINE, edge_opacity=0.25,
             line_width=1, lighting=not self._flat, ambient=0.35, diffuse=0.75, specular=0.1,
-            smooth_shading=not self._flat, split_sharp_edges=not self._flat, show_scalar_bar=False,
+            smooth_shading=not self._flat, split_sharp_edges=not self._flat, show_scalar_bar=False, opacity=opacity,
         )  # fmt: skip
 
     def add_lines(self, lines: pyvista.DataSet) -> None:
@@ -113,7 +116,19 @@ class Scene:
             faces, scalars="damage", cmap=DAMAGE, clim=(0.0, 1.0), line_width=5 if self._flat else 1, lighting=False,
             show_scalar_bar=False,
         )  # fmt: skip
-        _bring_forward(actor.mapper)
+        _bring_forward(actor)
+
+    def add_faces(self, faces: pyvista.DataSet, colour: Any) -> None:
+        """Add faces of a crack in one colour."""
+        if faces.n_cells:
+            _bring_forward(self._plotter.add_mesh(faces, color=colour, line_width=5, lighting=False))
+
+    def add_nodes(self, points: Array, colour: Any, diameter: float) -> None:
+        """Mark some nodes by dots of a diameter [pixels]."""
+        if len(points):
+            self._plotter.add_points(
+                points, color=colour, point_size=diameter, render_points_as_spheres=True, lighting=False
+            )
 
     def add_tool(self, tool: pyvista.PolyData) -> None:
         """Add rigid tools."""
@@ -121,16 +136,6 @@ class Scene:
             tool, color="#a3adb8", opacity=0.45, specular=1.0, specular_power=15, smooth_shading=not self._flat,
             split_sharp_edges=not self._flat, lighting=not self._flat,
         )  # fmt: skip
-
-    def add_faces(self, faces: pyvista.DataSet, colour: str) -> None:
-        """Add facets, such as those of an intact crack, in one colour."""
-        actor = self._plotter.add_mesh(faces, color=colour, line_width=5 if self._flat else 1, lighting=False)
-        _bring_forward(actor.mapper)
-
-    def add_marks(self, points: Array, colour: str) -> None:
-        """Add marks at some points."""
-        if len(points):
-            self._plotter.add_points(points, color=colour, point_size=14, render_points_as_spheres=True)
 
     def shot(self, view: View) -> tuple[NDArray[np.uint8], float]:
         """Draw the scene.
@@ -151,8 +156,9 @@ class Scene:
         self._plotter.close()
 
 
-def _bring_forward(mapper: Any) -> None:
-    """Show faces before the face of the body that is in the same place."""
+def _bring_forward(actor: Any) -> None:
+    """Show an actor before the face of the body that is in the same place."""
+    mapper = actor.mapper
     mapper.SetResolveCoincidentTopologyToPolygonOffset()
     mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(-4.0, -4.0)
     mapper.SetRelativeCoincidentTopologyLineOffsetParameters(-4.0, -4.0)

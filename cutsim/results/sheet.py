@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
@@ -24,6 +23,8 @@ SIZE = (8.0, 5.0)
 _TITLE = 0.94
 # where the bars are: left end and width
 _PLACES = ((0.06, 0.34), (0.47, 0.26))
+# entries of a legend below each other
+_LINES = 4
 _SCALE_END, _SCALE_LARGEST = 0.95, 0.17
 
 
@@ -35,22 +36,53 @@ class Bar:
         label: What it is, with the unit; mathematics of TeX is set.
         colours: Its colours.
         limits: Its range.
-        names: Names of its values 0, 1, …, where it has these only.
     """
 
     label: str
     colours: str | Colormap
     limits: tuple[float, float]
-    names: Sequence[str] = ()
 
 
-def compose(pixels: NDArray[np.uint8], width: float, bars: Sequence[Bar], *, title: str, length: str) -> Figure:
+@dataclass(frozen=True)
+class Entry:
+    """Entry of a legend.
+
+    Attributes:
+        label: What it is.
+        colour: Its colour.
+        mark: "area", "line" or "point".
+    """
+
+    label: str
+    colour: Any
+    mark: str = "area"
+
+    @property
+    def handle(self) -> Any:
+        """What stands for it in a legend of matplotlib."""
+        if self.mark == "area":
+            return Patch(facecolor=self.colour, edgecolor="0.4", linewidth=0.4, label=self.label)
+        if self.mark == "line":
+            return Line2D([], [], color=self.colour, linewidth=2.5, label=self.label)
+        return Line2D([], [], color=self.colour, linestyle="", marker="o", markersize=5, label=self.label)
+
+
+def compose(
+    pixels: NDArray[np.uint8],
+    width: float,
+    bars: Sequence[Bar],
+    entries: Sequence[Entry] = (),
+    *,
+    title: str,
+    length: str,
+) -> Figure:
     """Put a scene on a sheet.
 
     Args:
         pixels: The scene, shape (height, width, 4).
         width: Its width [length].
-        bars: Its fields, two at most.
+        bars: Its fields, two at most; none beside a legend.
+        entries: Entries of its legend.
         title: Text above it.
         length: Symbol of the unit of length.
 
@@ -64,7 +96,9 @@ def compose(pixels: NDArray[np.uint8], width: float, bars: Sequence[Bar], *, tit
     if title:
         figure.text(0.5, _TITLE, title, ha="center", fontsize=11)
     for bar, place in zip(bars, _PLACES, strict=False):
-        _add_names(figure, bar) if bar.names else _add_bar(figure, bar, *place)
+        _add_bar(figure, bar, *place)
+    if entries:
+        _add_legend(figure, entries)
     _add_scale(figure, width, length)
     return figure
 
@@ -79,12 +113,11 @@ def _add_bar(figure: Figure, bar: Bar, left: float, width: float) -> None:
     axes.set_title(bar.label, fontsize=9, pad=4)
 
 
-def _add_names(figure: Figure, bar: Bar) -> None:
-    colours = colormaps[bar.colours] if isinstance(bar.colours, str) else bar.colours
-    handles: list[Any] = [Patch(color=colours(i), label=name) for i, name in enumerate(bar.names)]
+def _add_legend(figure: Figure, entries: Sequence[Entry]) -> None:
     figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.02, 0.0), ncols=min(len(handles), 4), fontsize=8.5,
-        frameon=False, title=bar.label or None, title_fontsize=9, handlelength=1.2, handleheight=0.9, alignment="left",
+        handles=[entry.handle for entry in entries], loc="lower left", bbox_to_anchor=(0.01, -0.005), fontsize=8,
+        ncols=-(-len(entries) // _LINES), frameon=False, handlelength=1.3, handleheight=0.9, labelspacing=0.35,
+        columnspacing=1.4,
     )  # fmt: skip
 
 

@@ -9,14 +9,13 @@ from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
-from dolfinx import fem
 
 from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
 from cutsim.base.checks import count, require, require_number
 from cutsim.base.terms import Bonded, FacetShowing, offering
 from cutsim.base.units import Units
 from cutsim.bodies.solid import Solid
-from cutsim.results.grids import VonMises, gather_facets, gather_grid, library
+from cutsim.results.grids import VonMises, gather_facets, gather_grid, library, part_numbers
 from cutsim.results.output import Closing, on_root
 from cutsim.results.stages import FOLDER, Skin, Stage
 from cutsim.results.tool_surfaces import ToolSurfaces, front
@@ -123,10 +122,7 @@ class _Scene:
         if not self.shown:
             return
         self._stress, self._parts = VonMises(solids), tuple(solid.name for solid in solids)
-        self._part = fem.Function(fem.functionspace(state.mesh, ("DG", 0)))
-        for number, solid in enumerate(solids):
-            cells = slice(None) if solid.cells is None else solid.cells
-            self._part.x.array[self._part.function_space.dofmap.list[cells, 0]] = number
+        self._part = part_numbers(state, solids)
         self._cracks = [
             t for t in offering(terms, FacetShowing) if isinstance(t, Bonded) and "damage" in t.facet_fields
         ]

@@ -10,8 +10,8 @@ from matplotlib import colormaps
 from matplotlib.colors import Colormap, to_hex
 
 from cutsim.base.arrays import Array
-from cutsim.results.pictures import ASIDE, Look, polydata
-from cutsim.results.scene import DAMAGE, STRESS, corners, sharp_edges
+from cutsim.results.pictures import Look, polydata
+from cutsim.results.scene import ASIDE, DAMAGE, STRESS, corners, sharp_edges
 from cutsim.results.stages import Skin, Stage, spread
 from cutsim.results.web_plots import LAYOUT, in_page
 
