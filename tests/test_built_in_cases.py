@@ -109,6 +109,29 @@ def test_the_cut_is_that_of_python():
 
 
 @pytest.mark.mpi
+def test_the_weight_of_bodies_rests_on_their_support(tmp_path):
+    """ρ g V of one of two bodies of 2 mm × 1 mm, and f V of a force on both."""
+    path = tmp_path / "weight.toml"
+    path.write_text(
+        """
+        mesh = { geometry = "block", dim = 2, set = { Lx = 2, H = 1, lc = 0.5, band = 0.5, notch = 0 } }
+        material = { model = "linear-elastic", young = 1, poisson = 0.3 }
+        bodies.left = { cells = "left" }
+        bodies.right = { cells = "right", density = "1 g/cm^3" }
+        supports.ground = { facets = "bottom", direction = "y" }
+        supports.side = { facets = "far_left", direction = "x" }
+        parameters.g = "9.81 m/s^2"
+        loads.weight = { kind = "weight", bodies = "right", direction = "-y", value = { times = [0, 1], values = [0, "g"] } }
+        loads.pull = { kind = "body-force", direction = [0, 2], value = "2e-9*t" }
+        analysis.until = 1
+        steps.fixed = 1
+        """,
+        encoding="utf-8",
+    )
+    (report,) = steps(read_case(path).build(COMM).run, 1)
+    assert report.columns["ground_force"][0] == pytest.approx(1e-9 * 9810 * 2 - 2e-9 * 4)
+
+
 def test_a_group_that_the_mesh_lacks_is_named():
     case = read_case(CASES["dcb"], {"supports.clamp.facets": "front"}, quick=True)
     words = "supports.clamp.facets: 'front' is no group of facets of the mesh; it has crack, precrack, load_upper, "

@@ -33,6 +33,8 @@ DIMENSIONS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
         "flux": (-1, 1, -1, 0),
         "entropy": (1, 1, 0, -1),
         "one": (0, 0, 0, 0),
+        "acceleration": (1, 0, -2, 0),
+        "force per volume": (-3, 1, 0, 0),
         "stiffness": (-3, 1, 0, 0),
         "viscosity": (-2, 1, 1, 0),
         "interface viscosity": (-3, 1, 1, 0),

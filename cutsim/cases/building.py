@@ -157,7 +157,8 @@ def _general(domain: Domain) -> Simulation:
     rubbing = {friction.crack.name: friction for friction in crack_friction(domain, faces, value)}
     joined, rigid = pairs(domain, bodies), tools(domain, bodies, faces, value)
     parts = Parts(bodies, faces, rubbing, joined, {name: [tool] for name, tool in rigid.items()})
-    terms = [*bodies, *faces.values(), *rubbing.values(), *joined.values(), *rigid.values(), *loads(domain, state)]
+    touching = [*faces.values(), *rubbing.values(), *joined.values(), *rigid.values()]
+    terms = [*bodies, *touching, *loads(domain, state, bodies)]
     held = supports(domain, state)
     with refusing(domain.document):
         mechanics = Mechanics(state, terms, held, **_mechanics_options(domain))

@@ -5,7 +5,7 @@ from typing import Any
 
 from cutsim.cases.geometries import LAMINATE
 from cutsim.cases.keys import Keys
-from cutsim.cases.schema_parts import Tool
+from cutsim.cases.schema_parts import Tool, Weight
 
 #: Where something is wrong, what, and the value.
 Problem = tuple[Keys, str, Any]
@@ -59,6 +59,12 @@ def _layers(valid: Mapping[str, Any]) -> Iterator[Problem]:
         yield ("layers",), f"missing, must be given: the layers of the geometry {LAMINATE!r}", None
     if valid["layers"] and valid["bodies"]:
         yield ("bodies",), "not allowed beside [[layers]], each of which is a body", None
+    if valid["layers"] and valid["insertion"] is None:
+        yield (
+            ("layers",),
+            "not allowed without [insertion]: name the groups of the mesh under [bodies] and [cracks]",
+            None,
+        )
     names = [layer.name for layer in valid["layers"]]
     for i, name in enumerate(names):
         if name in names[:i]:
@@ -105,14 +111,17 @@ def _tools(valid: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _dynamics(valid: Mapping[str, Any]) -> Iterator[Problem]:
-    if valid["analysis"].type != "dynamic":
+    weights = [load for load in valid["loads"].values() if isinstance(load, Weight)]
+    dynamic = valid["analysis"].type == "dynamic"
+    if not weights and not dynamic:
         return
+    words = f"missing, must be given for {'a dynamic analysis' if dynamic else 'a weight'}"
     if not valid["bodies"] and not valid["layers"]:
-        yield ("bodies", "body", "density"), "missing, must be given for a dynamic analysis", None
+        yield ("bodies", "body", "density"), words, None
     for name, body in [*valid["bodies"].items(), *enumerate(valid["layers"])]:
-        if body.density is None:
-            table = "layers" if isinstance(name, int) else "bodies"
-            yield (table, name, "density"), "missing, must be given for a dynamic analysis", None
+        heavy = dynamic or any(not weight.bodies or name in weight.bodies for weight in weights)
+        if heavy and body.density is None:
+            yield ("layers" if isinstance(name, int) else "bodies", name, "density"), words, None
 
 
 def _heat(valid: Mapping[str, Any]) -> Iterator[Problem]:

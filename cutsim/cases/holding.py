@@ -1,10 +1,13 @@
 """Supports and loads of a case."""
 
 from collections.abc import Iterator, Sequence
+from typing import Literal
 
 import numpy as np
 
+from cutsim.bodies.body_force import BodyForce
 from cutsim.bodies.loads import Load, NodalForce, Pressure, Support, Traction
+from cutsim.bodies.solid import Solid
 from cutsim.cases import schema_parts as schema
 from cutsim.cases.domains import Domain, Entities
 from cutsim.cases.expressions import TimeValue, corners_of
@@ -52,16 +55,43 @@ def _vertices(domain: Domain, key: Keys, table: schema.Support | schema.NodalFor
     return domain.vertices((*key, "vertices"), table.vertices)
 
 
-def loads(domain: Domain, state: State) -> list[Load]:
+def loads(domain: Domain, state: State, solids: Sequence[Solid]) -> list[Load]:
     """Loads of a case. Collective.
+
+    Args:
+        domain: The mesh of the case.
+        state: Displacement and time.
+        solids: Its bodies.
 
     Raises:
         CaseError: A group is missing, or a load refuses a parameter.
     """
-    return [_load(domain, state, name, table) for name, table in domain.tables.loads.items()]
+    found: list[Load] = []
+    for name, table in domain.tables.loads.items():
+        if isinstance(table, schema.BodyForce | schema.Weight):
+            found += _body_forces(domain, state, solids, name, table)
+        else:
+            found.append(_load(domain, state, name, table))
+    return found
 
 
-def _load(domain: Domain, state: State, name: str, table: schema.Load) -> Load:
+def _body_forces(
+    domain: Domain, state: State, solids: Sequence[Solid], name: str, table: schema.BodyForce | schema.Weight
+) -> Iterator[BodyForce]:
+    """A force on each body, with its name behind that of the load if there are several."""
+    chosen = [solid for solid in solids if not table.bodies or solid.name in table.bodies]
+    per: Literal["mass", "volume"] = "mass" if isinstance(table, schema.Weight) else "volume"
+    corners, value = _corners(table.corners, table.value), function(table.value)
+    for solid in chosen:
+        label = name if len(chosen) == 1 else f"{name}_{solid.name}"
+        with refusing(domain.document, "loads", name):
+            along = direction(table.direction, state.mesh.geometry.dim)
+            yield BodyForce(state, solid, along, value, per=per, name=label, corners=corners)
+
+
+def _load(
+    domain: Domain, state: State, name: str, table: schema.Pressure | schema.Traction | schema.NodalForce
+) -> Load:
     key, corners, value = ("loads", name), _corners(table.corners, table.value), function(table.value)
     if isinstance(table, schema.NodalForce):
         vertices = _vertices(domain, key, table)

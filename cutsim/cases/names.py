@@ -50,6 +50,7 @@ Groups = Annotated[tuple[Group, ...], _SEVERAL]
 #: Groups of outer facets, and faces of cracks: the name of a crack with + or −, such as "glue+".
 Surfaces = Annotated[tuple[Annotated[str, Known("surfaces")], ...], _SEVERAL]
 BodyName = Annotated[str, Known("bodies")]
+BodyNames = Annotated[tuple[BodyName, ...], _SEVERAL]
 CrackName = Annotated[str, Known("cracks")]
 PairName = Annotated[str, Known("pairs")]
 ToolName = Annotated[str, Known("tools")]

@@ -7,7 +7,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, Viscosity
 from cutsim.cases.constructed import Constructed, FromTable, With
 from cutsim.cases.expressions import TimeValue
-from cutsim.cases.names import ExistingFile, Group, Groups, Surfaces
+from cutsim.cases.names import BodyNames, ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
 from cutsim.cases.tables import FORM, Flag, Table, Varying, chosen_by
 from cutsim.materials.thermoelastic import ThermoElastic
@@ -314,8 +314,42 @@ class NodalForce(Table):
         return self
 
 
+class BodyForce(Table):
+    """Force on all of a body per reference volume; a dead load.
+
+    Args:
+        bodies: Names of the bodies; by default all.
+        direction: Direction of the force: "x", "-y" and so on, or a vector, whose length does not matter.
+        value: Force per reference volume along the direction [force/length³].
+        corners: Times at which it has a kink; those of a table are known [time].
+    """
+
+    kind: Literal["body-force"]
+    bodies: BodyNames = ()
+    direction: Direction
+    value: Annotated[TimeValue, Varying("force per volume")]
+    corners: tuple[Time, ...] = ()
+
+
+class Weight(Table):
+    """Weight of bodies with a density: a force per mass.
+
+    Args:
+        bodies: Names of the bodies; by default all.
+        direction: Direction of gravity: "x", "-y" and so on, or a vector, whose length does not matter.
+        value: Acceleration of gravity, such as "9.81 m/s^2"; it may grow from zero [length/time²].
+        corners: Times at which it has a kink; those of a table are known [time].
+    """
+
+    kind: Literal["weight"]
+    bodies: BodyNames = ()
+    direction: Direction
+    value: Annotated[TimeValue, Varying("acceleration")]
+    corners: tuple[Time, ...] = ()
+
+
 Load = Annotated[
-    Pressure | Traction | NodalForce,
+    Pressure | Traction | NodalForce | BodyForce | Weight,
     Field(discriminator="kind"),
-    chosen_by("kind", ["pressure", "traction", "force"]),
+    chosen_by("kind", ["pressure", "traction", "force", "body-force", "weight"]),
 ]

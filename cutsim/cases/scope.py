@@ -52,7 +52,13 @@ class Scope(Numbers):
         if kind == "surfaces":
             groups, cracks = self.names("groups"), self._entries("cracks")
             return None if groups is None else [*groups, *(f"{crack}{side}" for crack in cracks for side in "+-")]
-        return self._entries(kind)
+        return self._bodies() if kind == "bodies" else self._entries(kind)
+
+    def _bodies(self) -> list[str]:
+        """Names of bodies and layers; a case that has none of them has one body."""
+        layers = self._tables.get("layers")
+        named = [entry for entry in layers if isinstance(entry, Mapping)] if isinstance(layers, list) else []
+        return [*self._entries("bodies"), *(str(entry.get("name", "")) for entry in named)] or ["body"]
 
     def _entries(self, table: str) -> list[str]:
         entries = self._tables.get(table)
