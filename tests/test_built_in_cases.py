@@ -121,10 +121,19 @@ def test_the_weight_of_bodies_rests_on_their_support(tmp_path):
         supports.ground = { facets = "bottom", direction = "y" }
         supports.side = { facets = "far_left", direction = "x" }
         parameters.g = "9.81 m/s^2"
-        loads.weight = { kind = "weight", bodies = "right", direction = "-y", value = { times = [0, 1], values = [0, "g"] } }
-        loads.pull = { kind = "body-force", direction = [0, 2], value = "2e-9*t" }
-        analysis.until = 1
-        steps.fixed = 1
+        [loads.weight]
+        kind = "weight"
+        bodies = "right"
+        direction = "-y"
+        value = { times = [0, 1], values = [0, "g"] }
+        [loads.pull]
+        kind = "body-force"
+        direction = [0, 2]
+        value = "2e-9*t"
+        [analysis]
+        until = 1
+        [steps]
+        fixed = 1
         """,
         encoding="utf-8",
     )
