@@ -20,7 +20,7 @@ from cutsim.materials.elastic import IsochoricNeoHookean, NeoHookean, StVenantKi
 from cutsim.materials.fibres import DispersedFibres, ExponentialFibres, Reinforced
 from cutsim.materials.rubbers import Ogden, Yeoh
 from cutsim.materials.viscoelastic import Prony
-from cutsim.results.output import interpolate
+from cutsim.results.field_files import interpolate
 from helpers.blocks import make_blocks
 from helpers.examples import AXIS, MOONEY
 from helpers.fields import smooth

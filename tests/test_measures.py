@@ -18,7 +18,7 @@ WIDE = {
     "identify.inverse.fit_simulation": 11,
     "bodies.solid.Solid.__init__": 11,
     "commands.fit_material.command": 10,
-    "results.recording.Recording.__init__": 12,
+    "results.recording.Recording.__init__": 13,
     "analysis.mechanics.Mechanics.__init__": 10,
     "interface.crack.Crack.__init__": 10,
     "fields.laminate.laminate": 9,

@@ -19,7 +19,8 @@ from rich.console import Console
 from cutsim.base.compat import cell_partitioner
 from cutsim.base.units import KINDS, Units
 from cutsim.fields.space import cracked_space
-from cutsim.results.output import FieldWriter, HistoryWriter, read_history, write_summary
+from cutsim.results.field_files import FieldWriter
+from cutsim.results.output import HistoryWriter, read_history, write_summary
 from cutsim.results.progress import Progress
 from helpers.output import written
 

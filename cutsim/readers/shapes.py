@@ -3,6 +3,7 @@
 import numpy as np
 from dolfinx import cpp
 from dolfinx.mesh import CellType
+from numpy.typing import NDArray
 
 from cutsim.readers.mesh_data import Floats, Indices
 
@@ -95,6 +96,21 @@ def in_order_of_dolfinx(shape: str, nodes: Indices) -> Indices:
     """Nodes of cells that can be used, from the order of VTK."""
     cell, _, count = USABLE[shape]
     return nodes[:, cpp.io.perm_vtk(getattr(CellType, cell), count)]
+
+
+def in_order_of_vtk(cell: str, nodes: NDArray[np.integer]) -> tuple[str, Indices]:
+    """Type, as meshio calls it, and nodes in the order of VTK of cells of dolfinx.
+
+    Args:
+        cell: Cell as dolfinx calls it; of an interval the type is a line.
+        nodes: Nodes of the cells, corners first; those of more than degree 2 are left out.
+    """
+    known = {count: shape for shape, (name, degree, count) in USABLE.items() if name == cell and degree < 3}
+    if cell == "interval":
+        return "line", nodes[:, :2].astype(np.int64)
+    count = max(count for count in known if count <= nodes.shape[1])
+    order = np.argsort(cpp.io.perm_vtk(getattr(CellType, cell), count))
+    return known[count], nodes[:, :count][:, order].astype(np.int64)
 
 
 def from_gmsh(shape: str, nodes: Indices) -> Indices:

@@ -18,7 +18,8 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Columns, FacetShowing, offering
 from cutsim.base.units import Units
 from cutsim.results.checkpoints import Checkpoints, ended_together
-from cutsim.results.output import HISTORY, FieldWriter, HistoryWriter, claim_folder, first_rows, write_summary
+from cutsim.results.field_files import FieldWriter, Format
+from cutsim.results.output import HISTORY, HistoryWriter, claim_folder, first_rows, write_summary
 from cutsim.results.progress import Progress
 
 
@@ -34,8 +35,8 @@ class Recording:
     """Recorder of a run: pass it to `cutsim.analysis.stepping.run`. Use it as a context manager; collective.
 
     Writes ``history.csv`` row by row and, every few steps and after the last, also if the run fails or is stopped,
-    ``displacement.bp``, ``fields.bp`` and a file for each crack, and shows progress.  It ends with one line that says
-    whether the run is to be trusted, and with the same in ``summary.json``.
+    files of fields (``displacement``, ``fields`` and one for each crack), and shows progress. It ends with one line
+    that says whether the run is to be trusted, and with the same in ``summary.json``.
 
     Args:
         folder: Where the files go.
@@ -52,6 +53,7 @@ class Recording:
             its folder: rows of the history after the checkpoint are removed, and fields go to files of their own
             (``displacement_2.bp`` and so on).
         quiet: Whether no progress is shown.
+        format: Format of the fields; see `cutsim.results.field_files.FieldWriter`.
 
     Attributes:
         history: Column → list of values so far, the same on all ranks.
@@ -76,6 +78,7 @@ class Recording:
         overwrite: bool = False,
         checkpoints: Checkpoints | None = None,
         quiet: bool = False,
+        format: Format | None = None,
     ) -> None:
         require_number("every", every, nonnegative)
         self.folder, self.problem, self._units = Path(folder), problem, _units(problem, units)
@@ -89,7 +92,8 @@ class Recording:
         self._progress = self._stack.enter_context(Progress(until, comm, title, start=start, quiet=quiet))
         self._fields: _FieldFiles | None = None
         if every:
-            self._fields = _FieldFiles(self.folder, problem, derived or {}, every, self._stack, anew=not resumed)
+            options = {"anew": not resumed, "format": format}
+            self._fields = _FieldFiles(self.folder, problem, derived or {}, every, self._stack, options)
 
     def _claim(self, *, overwrite: bool) -> bool:
         """Make sure that the folder is that of this run; whether a resumed run goes on there. Collective."""
@@ -209,12 +213,18 @@ class _FieldFiles:
     """Files with the fields of a problem every so many steps, those of its facets among them; collective."""
 
     def __init__(
-        self, folder: Path, problem: Problem, derived: Mapping[str, Expr], every: int, stack: ExitStack, *, anew: bool
+        self,
+        folder: Path,
+        problem: Problem,
+        derived: Mapping[str, Expr],
+        every: int,
+        stack: ExitStack,
+        options: Mapping[str, Any],
     ) -> None:
         self.every = every
         self._facets = [_FacetFields(t) for t in offering(problem.terms, FacetShowing) if t.facet_fields]
         surfaces = {facets.term.name: facets.functions for facets in self._facets}
-        writer = FieldWriter(folder, problem.state.u, {**problem.fields, **derived}, surfaces, anew=anew)
+        writer = FieldWriter(folder, problem.state.u, {**problem.fields, **derived}, surfaces, **options)
         self._writer = stack.enter_context(writer)
 
     def write(self, time: float) -> None:

@@ -49,8 +49,9 @@ from cutsim import (
     read_geo,
     run,
 )
+from cutsim.results.field_files import interpolate
 from cutsim.results.grids import gather_grid
-from cutsim.results.output import claim_folder, interpolate
+from cutsim.results.output import claim_folder
 from cutsim.results.pictures import draw_body
 from cutsim.results.plots import Curve, plot_curves, plot_energy
 from cutsim.results.recording import Recording

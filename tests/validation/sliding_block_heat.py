@@ -82,8 +82,9 @@ from cutsim import (
     run,
 )
 from cutsim.base.units import Units
+from cutsim.results.field_files import interpolate
 from cutsim.results.grids import gather_grid
-from cutsim.results.output import claim_folder, interpolate, write_summary
+from cutsim.results.output import claim_folder, write_summary
 from cutsim.results.pictures import draw_body
 from cutsim.results.plots import Curve, plot_curves
 from cutsim.results.recording import Columns, Recording
