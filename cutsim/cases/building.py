@@ -28,6 +28,7 @@ from cutsim.cases.refusals import refused, refusing
 from cutsim.cases.schema import CaseTables
 from cutsim.cases.tools import tools
 from cutsim.fields.meshing import TaggedMesh
+from cutsim.results.field_files import Format
 from cutsim.results.setup_picture import draw_setup
 from cutsim.solvers.convergence import Tolerances
 from cutsim.studies.insertion import Insertion
@@ -49,6 +50,7 @@ class Simulation:
         curve: Columns of the history that tell most: abscissa and ordinate.
         mirror: Planes of symmetry through the origin, by the axes normal to them.
         every: Fields are written every so many steps.
+        format: Format of their files.
         insertion: The insertion, if it is one.
     """
 
@@ -63,6 +65,7 @@ class Simulation:
     curve: tuple[str, str]
     mirror: tuple[str, ...] = ()
     every: int = 5
+    format: Format | None = None
     insertion: Insertion | None = None
 
     @property
@@ -208,6 +211,7 @@ def _simulation(
         curve=tables.output.curve or curve,
         mirror=tuple(tables.output.mirror or mirror),
         every=tables.output.every,
+        format=tables.output.format,
         insertion=cut,
     )
 

@@ -152,7 +152,7 @@ def _meshed(tables: CaseTables, document: Document, comm: MPI.Comm) -> TaggedMes
     if mesh.dim is None:
         raise refused(document, ("mesh", "dim"), "missing, must be given: 2 or 3, the dimension of mesh and space")
     if mesh.file is not None:
-        return read_mesh(mesh.file, comm, gdim=mesh.dim, scale=mesh.scale, only=mesh.only or None)
+        return read_mesh(mesh.file, comm, mesh.dim, scale=mesh.scale, only=mesh.only or None, merge=mesh.merge)
     assert mesh.geometry is not None
     own = {"dim": float(mesh.dim)} if "dim" in outline(mesh.geometry).parameters else {}
     return read_geo(geometry(mesh.geometry), comm, {**own, **mesh.set}, gdim=mesh.dim)

@@ -144,6 +144,7 @@ def _recording(
         overwrite=overwrite,
         checkpoints=checkpoints,
         quiet=quiet,
+        format=simulation.format,
     )
 
 

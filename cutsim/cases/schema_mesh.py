@@ -1,13 +1,18 @@
 """Schema of case files: the mesh."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from cutsim.base.checks import require
 from cutsim.base.units import Length, Number
 from cutsim.cases.names import ExistingFile, Geometry, GeometryParameter, Groups
 from cutsim.cases.tables import Flag, Free, Table
+
+Merge = Annotated[
+    Annotated[Flag, Tag("<all>")] | Annotated[tuple[tuple[str, str], ...], Tag("<pairs>")],
+    Discriminator(lambda value: "<pairs>" if isinstance(value, list | tuple) else "<all>"),
+]
 
 
 class Mesh(Table):
@@ -19,6 +24,8 @@ class Mesh(Table):
         file: File with a mesh and its groups, relative to the case file.
         only: Groups of cells of the file that make the mesh; by default all its cells.
         scale: Length in the units of the case of one unit of the file.
+        merge: Whether nodes of the file that lie on each other become one: true, false, or pairs of groups of cells
+            between which they do.
         dim: Dimension of the mesh and of its space; by default that of the geometry, or 3 for a file.
         degree: Degree of the displacement.
         axisymmetric: Whether the mesh is the meridian plane of a body of revolution about x = 0.
@@ -30,6 +37,7 @@ class Mesh(Table):
     file: ExistingFile | None = None
     only: tuple[str, ...] = ()
     scale: Number = 1.0
+    merge: Merge = False
     dim: Literal[2, 3] | None = None
     degree: Literal[1, 2] = 1
     axisymmetric: Flag = False
@@ -39,6 +47,7 @@ class Mesh(Table):
     def _one_source(self) -> "Mesh":
         if (self.geometry is None) == (self.file is None):
             raise ValueError("must have either geometry or file")
+        require("merge", self.merge, self.geometry is None or not self.merge, "left out beside a geometry")
         require("only", list(self.only), self.geometry is None or not self.only, "left out beside a geometry")
         require("set", list(self.set), self.file is None or not self.set, "left out beside a file")
         return self

@@ -156,7 +156,7 @@ class Output(Table):
             that of an insertion is known.
         every: Fields are written every so many steps; 0 for none.
         stress: Whether stresses are written.
-        format: Files for ParaView: "vtx" needs ADIOS, "vtu" nothing.
+        format: Files for ParaView: "vtx" needs ADIOS2, "vtu" nothing; by default what dolfinx can write.
         animation: Whether an animation is made at the end.
         report: Whether a report is made at the end.
     """
@@ -165,7 +165,7 @@ class Output(Table):
     mirror: tuple[Literal["x", "y", "z"], ...] = ()
     every: Whole = 5
     stress: Flag = True
-    format: Literal["vtx", "vtu"] = "vtx"
+    format: Literal["vtx", "vtu"] | None = None
     animation: Flag = True
     report: Flag = True
 

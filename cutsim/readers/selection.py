@@ -109,12 +109,9 @@ class Selection:
             kinds.setdefault(block.kind, Counter())[block.name] += int(
                 np.count_nonzero(which & (self._block == number))
             )
-        return (
-            ", ".join(
-                f"{sum(names.values())} {kind!r}" + (f" (in {_listed(list(names))})" if any(names) else "")
-                for kind, names in kinds.items()
-            )
-            or "none"
+        return ", ".join(
+            f"{sum(names.values())} {kind!r}" + (f" (in {_listed(list(names))})" if any(names) else "")
+            for kind, names in kinds.items()
         )
 
 
