@@ -18,17 +18,22 @@ INF = float("inf")
 
 #: Made by others, not from numbers of a user.
 MADE = {"CrackedBody", "Insertion", "LayeredBlock", "StepReport"}
-#: What shows and keeps results, after all was computed.
-SHOWN = {"Checkpoints", "Curve", "Recording", "read_history"}
-SHOWN |= {"draw_body", "draw_insertion", "draw_stress", "plot_curves", "plot_energy", "plot_parts"}
+#: A picture is never worth a run: what cannot be drawn is logged.
+DRAWN = {"draw_body"}
 #: Where infinity says that there is no limit.
 ENDLESS = {("run", "until")}
 #: What takes files and curves, beside what is in `cutsim` itself.
 FILES_AND_CURVES = ("StressTest", "fit_material", "fit_simulation", "read_table")
 #: Functions that are called during the run only.
-LATER = {("ToolPath", "position"), ("run", "record"), ("run", "stop"), ("identify.fit_simulation", "simulate")}
+LATER = {
+    ("Recording", "extra"),
+    ("ToolPath", "position"),
+    ("run", "record"),
+    ("run", "stop"),
+    ("identify.fit_simulation", "simulate"),
+}
 #: Handed to dolfinx as they are.
-FREE = {("cracked_space", "element")}
+FREE = {("cracked_space", "element"), ("draw_insertion", "view"), ("draw_stress", "view")}
 
 
 def callables():
@@ -37,7 +42,7 @@ def callables():
     for name in cutsim.__all__:
         item = getattr(cutsim, name)
         error = inspect.isclass(item) and issubclass(item, Exception)
-        if name not in MADE | SHOWN and not error and not getattr(item, "_is_protocol", False):
+        if name not in MADE | DRAWN and not error and not getattr(item, "_is_protocol", False):
             found[name] = item
         if inspect.isclass(item):
             methods = (n for c in item.__mro__ for n, m in vars(c).items() if isinstance(m, classmethod))

@@ -237,6 +237,15 @@ def test_steps_grow_while_they_are_easy():
     assert steps.max() <= 4e-3 * 1.1
 
 
+def test_a_column_to_show_that_does_not_exist_is_named(tmp_path):
+    mechanics, misspelt = opening_blocks(), {"force": "top_forc"}
+    with (
+        pytest.raises(ValueError, match=r"^show = 'top_forc' .* must be one of the columns .*top_force"),
+        Recording(tmp_path, mechanics, 0.1, show=misspelt, quiet=True) as record,
+    ):
+        run(mechanics, 0.1, StepControl.fixed(0.1), record)
+
+
 def test_stop_ends_the_run():
     report = run(opening_blocks(), 1.0, StepControl.fixed(0.05), stop=lambda r: r.number == 3)
     assert (report.number, report.time) == (3, pytest.approx(0.15))

@@ -11,6 +11,7 @@ from mpi4py import MPI
 from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
 from cutsim.base.checks import nonnegative, require_number
 from cutsim.base.log import collective_logger
+from cutsim.base.signatures import checked
 from cutsim.results.checkpoint_file import read_checkpoint, write_checkpoint
 from cutsim.results.output import on_root
 
@@ -42,6 +43,7 @@ class Checkpoints:
             as is that of another mesh. What is not named, such as a parameter, may be changed.
     """
 
+    @checked
     def __init__(
         self, folder: Path | str, problem: Problem, *, minutes: float = 10.0, case: Mapping[str, Any] | None = None
     ) -> None:

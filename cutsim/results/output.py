@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.base.files import replace_file
+from cutsim.base.signatures import checked
 from cutsim.base.units import Units
 
 #: Name of the file with the rows of a run.
@@ -149,6 +150,7 @@ def _kept_rows(path: Path, header: list[str], rows: int) -> str:
     return "".join(lines[: 1 + rows])
 
 
+@checked
 def read_history(path: Path | str) -> dict[str, NDArray[np.float64]]:
     """Read a history written by `HistoryWriter`, also one that is still growing.
 

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.signatures import checked
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
 from cutsim.results.grids import VonMises, gather_facets, gather_grid
@@ -201,6 +202,7 @@ def polydata(skin: Skin) -> pyvista.PolyData:
     return mesh
 
 
+@checked
 def draw_stress(path: Path | str, solids: Solid | Sequence[Solid], crack: Crack | None = None, **view: Any) -> None:
     """Draw the deformed body coloured by von Mises' stress, and a crack by its damage. Collective.
 

@@ -14,7 +14,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import as_numbers, require
+from cutsim.base.signatures import checked
 
 # Okabe and Ito's colours, which the colour-blind can tell apart.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -33,6 +34,7 @@ ENERGIES = {
 }
 
 
+@checked
 @dataclass(frozen=True)
 class Curve:
     """A curve of a plot.
@@ -43,6 +45,9 @@ class Curve:
         label: Text in the legend; an empty one leaves the curve out of it.
         style: Line and marker in matplotlib's short form, such as ``"-"``, ``"--"`` or ``"o"``.
         partial: Whether it ends early, as that of an interrupted run: a cross at its end and the legend then say so.
+
+    Raises:
+        ValueError: Abscissae or ordinates are no numbers, or not as many of one as of the other.
     """
 
     x: ArrayLike
@@ -50,6 +55,9 @@ class Curve:
     label: str = ""
     style: str = "-"
     partial: bool = False
+
+    def __post_init__(self) -> None:
+        _require_alike("x", self.x, "y", self.y)
 
     @property
     def text(self) -> str:
@@ -68,6 +76,7 @@ def distinct(count: int) -> list[str]:
     return [to_hex(colour) for colour in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, count))]
 
 
+@checked
 def plot_curves(
     path: Path | str,
     curves: Sequence[Curve],
@@ -105,6 +114,7 @@ def plot_curves(
         _save(figure, path)
 
 
+@checked
 def plot_energy(
     path: Path | str,
     history: Mapping[str, NDArray[np.float64]],
@@ -145,6 +155,7 @@ def plot_energy(
         _save(figure, path)
 
 
+@checked
 def plot_parts(
     path: Path | str,
     x: ArrayLike,
@@ -166,6 +177,8 @@ def plot_parts(
         ylabel: Text at the ordinate and in the legend, with the unit.
         title: Text above the plot.
     """
+    for name, values in (("total", total), *parts.items()):
+        _require_alike("x", x, name, values)
     colours = dict(zip(parts, COLOURS, strict=False))
     shown = [label for label, part in parts.items() if np.any(part)]
     with matplotlib.rc_context(_style()):
@@ -177,6 +190,13 @@ def plot_parts(
         handles, texts = axes.get_legend_handles_labels()
         axes.legend(handles[::-1], texts[::-1], loc="upper left")
         _save(figure, path)
+
+
+def _require_alike(first: str, x: ArrayLike, second: str, y: ArrayLike) -> None:
+    """Refuse two rows of numbers that are not as long as each other; the shorter one is named."""
+    one, other = as_numbers(first, x), as_numbers(second, y)
+    name, shape, asked = (first, one.shape, other.shape) if one.size < other.size else (second, other.shape, one.shape)
+    require(f"shape of {name}", shape, shape == asked and len(shape) == 1, f"{asked}, one-dimensional")
 
 
 def _style() -> dict[str, Any]:

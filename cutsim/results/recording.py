@@ -13,8 +13,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.analysis.stepping import Problem, StepReport
-from cutsim.base.checks import nonnegative, require, require_number
+from cutsim.base.checks import above, count, require, require_number
 from cutsim.base.kinematics import Expr
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns, FacetShowing, offering
 from cutsim.base.units import Units
 from cutsim.results.checkpoints import Checkpoints, ended_together
@@ -60,9 +61,11 @@ class Recording:
 
     Raises:
         FileExistsError: The folder has the history of an older run, which is not to be overwritten.
-        ValueError: The history of a resumed run has fewer rows than were written before the checkpoint.
+        ValueError: The run ends before it begins, `every` is no count, a column to show does not exist (at the first
+            step), or the history of a resumed run has fewer rows than were written before the checkpoint.
     """
 
+    @checked
     def __init__(
         self,
         folder: Path | str,
@@ -80,7 +83,8 @@ class Recording:
         quiet: bool = False,
         format: Format | None = None,
     ) -> None:
-        require_number("every", every, nonnegative)
+        require_number("every", every, count())
+        require_number("until", until, above(problem.state.time_old, "the time of the state"))
         self.folder, self.problem, self._units = Path(folder), problem, _units(problem, units)
         self._title, self._until, self._values = title, until, dict[str, Any]()
         self._show, self._extra = dict(show or {}), extra
@@ -131,6 +135,8 @@ class Recording:
         for name, value in row.items():
             self.history.setdefault(name, []).append(value)
         self._table.append(row)
+        for column in self._show.values():
+            require("show", column, column in row, f"one of the columns {', '.join(row)}")
         shown = {label: row[column] for label, column in self._show.items()}
         self._progress.update(report.time, step=report.number, **shown, iterations=report.outcome.iterations)
         written = self._written.committed

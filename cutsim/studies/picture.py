@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cutsim.base.signatures import checked
 from cutsim.results.pictures import draw_stress
 from cutsim.results.tool_surfaces import prism, revolved
 from cutsim.studies.insertion import Insertion
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 _ABOVE = 0.25
 
 
+@checked
 def draw_insertion(path: Path | str, cut: Insertion, **view: Any) -> None:
     """Draw the deformed body coloured by stress, the first part of its crack by damage, and the tool. Collective.
 

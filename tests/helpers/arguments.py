@@ -35,12 +35,14 @@ def things():
     layers = (cutsim.Layer("skin", 1.0, ELASTIC, EXPONENTIAL),)
     laminated = cutsim.laminate(comm, {"skin": 1.0}, length=1.0, size=0.25, band=0.5, notch=0.25)
     conductor = cutsim.HeatBody(temperature, capacity=1.0, conductivity=1.0, density=1.0)
+    block = cutsim.LayeredBlock.build(layers, laminated)
+    insertion = cutsim.Insertion.build(block, cutsim.Blade(0.3, 0.05, 0.1), cutsim.Drive(1.0), notch=0.25)
     corners, sides = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), np.array([(0, 1), (1, 2), (2, 0)])
     return {
         "V": b.state.V, "bond": EXPONENTIAL, "blade": cutsim.Blade(0.3, 0.05, 0.1), "cell_tags": laminated.cell_tags,
         "comm": comm, "conductor": conductor, "contact": contact, "control": cutsim.StepControl.fixed(1.0),
         "corners": corners, "coulomb": cutsim.Coulomb(0.3), "crack": b.crack(),
-        "cut": cutsim.LayeredBlock.build(layers, laminated), "drive": cutsim.Drive(1.0), "elastic": ELASTIC,
+        "block": block, "insertion": insertion, "drive": cutsim.Drive(1.0), "elastic": ELASTIC,
         "entities": top, "facet_tags": laminated.facet_tags, "facets": top,
         "heat": cutsim.HeatTransfer(temperature, [conductor]), "heat law": cutsim.ContactHeat(1.0, 1.0),
         "interface": b.facets, "laminated": laminated, "layers": layers, "master_facets": right,
@@ -58,7 +60,8 @@ NAMED = {
     "direction": (0.0, 1.0), "entities": "@entities", "facets": "@facets", "master_facets": "@master_facets",
     "plus": "@plus", "poisson": 0.3, "slave_facets": "@slave_facets", "surfaces": ["@surface"], "terms": ["@solid"],
     "tools": ["@tool"], "vertices": "@vertices", "x": LINE, "xlabel": "x", "y": LINE, "ylabel": "y",
-    "position": lambda t: np.zeros(2), "curves": [cutsim.Curve(LINE, LINE)], "path": "file.msh",
+    "curves": [cutsim.Curve(LINE, LINE)], "history": {}, "parts": {"part": LINE}, "path": "file.msh",
+    "position": lambda t: np.zeros(2), "solids": "@solid", "total": LINE,
 }  # fmt: skip
 
 #: Values beside those, of what is more particular.
@@ -85,6 +88,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "ToolPath.saw": {"start": (0.0, 0.0), "velocity": (0.0, 1.0), "stroke": (1.0, 0.0)},
     "Triangulation": {"points": "@corners", "facets": "@sides"},
     "Triangulation.read": {"file": "tool.stl"},
+    "plot_energy": {"x": "time"},
     "cracked_block": {"domain": "@laminated", "groups": ("crack_skin", "notch", "skin")},
     "cracked_space": {"element": ("Lagrange", 1, (2,)), "facets": "@interface"},
     "geometry": {"name": "block"},
