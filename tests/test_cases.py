@@ -29,15 +29,17 @@ from cutsim import (
 from cutsim.analysis.stepping import Control
 from cutsim.base.parameters import numbers
 from cutsim.base.units import Kind, Units
-from cutsim.cases import CaseError, built_in_cases, case_schema, check_groups, read_case
+from cutsim.cases import CaseError, built_in_cases, case_schema, read_case
 from cutsim.cases.classes import FAMILIES, classes, kebab
 from cutsim.cases.constructed import family
 from cutsim.cases.document import File
 from cutsim.cases.expressions import evaluate
 from cutsim.cases.json_schema import kinds_in
 from cutsim.cases.quantities import Converter, split
+from cutsim.cases.schema import CaseTables
 from cutsim.cases.schema_materials import in_units
 from cutsim.cases.scope import Scope
+from cutsim.cases.validation import validated
 from cutsim.fields import meshing
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.materials.elastic import Material
@@ -415,9 +417,9 @@ def test_groups_of_a_mesh_that_has_been_read(written):
     path = written(PEELED)
     names = "upper lower lowest glued open lower_top upper_bottom top bottom grip".split()
     case = read_case(path)
-    check_groups(case, names)
+    validated(CaseTables, case.document, names)
     with pytest.raises(CaseError, match=r"cracks.glue.facets: 'glued': .* groups .*'glue'"):
-        check_groups(case, [*names[:3], "glue", *names[4:]])
+        validated(CaseTables, case.document, [*names[:3], "glue", *names[4:]])
 
 
 VALUES = [

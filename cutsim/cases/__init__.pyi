@@ -4,7 +4,6 @@ from .document import CaseError as CaseError
 from .importing.draft import Imported as Imported
 from .importing.model_files import import_model as import_model
 from .json_schema import case_schema as case_schema
-from .reading import check_groups as check_groups
 from .reading import read_case as read_case
 from .running import RunOutcome as RunOutcome
 from .running import run_case as run_case

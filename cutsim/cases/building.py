@@ -27,6 +27,7 @@ from cutsim.cases.parts import Parts
 from cutsim.cases.refusals import refused, refusing
 from cutsim.cases.schema import CaseTables
 from cutsim.cases.tools import tools
+from cutsim.cases.validation import validated
 from cutsim.fields.meshing import TaggedMesh
 from cutsim.results.field_files import Format
 from cutsim.results.setup_picture import draw_setup
@@ -44,7 +45,8 @@ class Simulation:
         domain: The mesh with its groups.
         problem: The problem.
         parts: Bodies, cracks, pairs and tools by name.
-        schedule: Stages of the run: until when, and with which step control.
+        until: Time at which the run ends [time].
+        control: Step control.
         columns: Further columns of the history.
         derived: Further fields for output by name.
         curve: Columns of the history that tell most: abscissa and ordinate.
@@ -59,7 +61,8 @@ class Simulation:
     domain: TaggedMesh
     problem: Mechanics | ThermoMechanics
     parts: Parts
-    schedule: tuple[tuple[float, Control], ...]
+    until: float
+    control: Control
     columns: Callable[[Columns], Columns]
     derived: Mapping[str, Expr]
     curve: tuple[str, str]
@@ -72,11 +75,6 @@ class Simulation:
     def mechanics(self) -> Mechanics:
         """The mechanical problem."""
         return self.problem if isinstance(self.problem, Mechanics) else self.problem.mechanics
-
-    @property
-    def until(self) -> float:
-        """Time at which the run ends [time]."""
-        return self.schedule[-1][0]
 
     @property
     def unknowns(self) -> int:
@@ -102,9 +100,7 @@ class Simulation:
             Interrupted: A signal has ended the run.
             StepError: No step succeeds; says when, where and why.
         """
-        for until, control in self.schedule:
-            if until > self.problem.state.time_old:
-                run(self.problem, until, control, record)
+        run(self.problem, self.until, self.control, record)
 
 
 def build(tables: CaseTables, document: Document, comm: MPI.Comm) -> Simulation:
@@ -119,6 +115,7 @@ def build(tables: CaseTables, document: Document, comm: MPI.Comm) -> Simulation:
         CaseError: On all ranks: a group is missing in the mesh, or parts do not fit.
     """
     domain = Domain.of(tables, document, comm)
+    validated(CaseTables, document, domain.tagged.names)
     return _insertion(domain) if tables.insertion is not None else _general(domain)
 
 
@@ -205,7 +202,8 @@ def _simulation(
         domain=domain.tagged,
         problem=problem,
         parts=parts,
-        schedule=_schedule(domain, end),
+        until=_end(domain) if end is None else end,
+        control=tables.steps,
         columns=columns,
         derived=derived,
         curve=tables.output.curve or curve,
@@ -216,12 +214,11 @@ def _simulation(
     )
 
 
-def _schedule(domain: Domain, end: float | None) -> tuple[tuple[float, Control], ...]:
-    """Stages of the run."""
-    until = domain.tables.analysis.until if end is None else end
+def _end(domain: Domain) -> float:
+    until = domain.tables.analysis.until
     if until is None:
         raise refused(domain.document, ("analysis", "until"), "missing, must be given: the time at which the run ends")
-    return ((until, domain.tables.steps),)
+    return until
 
 
 def _curve(domain: Domain, rigid: Mapping[str, Any]) -> tuple[str, str]:

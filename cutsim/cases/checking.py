@@ -141,7 +141,8 @@ def _cost(simulation: Simulation) -> Iterator[Finding]:
     comm = simulation.problem.state.mesh.comm
     end, outcome, seconds = _tried(simulation)
     memory = comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _KIBIBYTE / _MEGABYTE)
-    steps = sum(ceil(until / getattr(control, "largest", control.first)) for until, control in simulation.schedule)
+    control = simulation.control
+    steps = ceil(simulation.until / getattr(control, "largest", control.first))
     one = seconds / max(outcome.iterations, 1)
     yield Finding("cost", "unknowns", str(simulation.unknowns))
     yield Finding("cost", f"a step to time {end:.3g}", f"{seconds:.2g} s, {outcome.iterations} iterations")
@@ -153,7 +154,7 @@ def _cost(simulation: Simulation) -> Iterator[Finding]:
 def _tried(simulation: Simulation) -> tuple[float, Outcome, float]:
     """Time, outcome and duration [s] of a step that was given up: the first one, or a longer one that needs work."""
     problem = simulation.problem
-    for end in (simulation.schedule[0][1].first, *(share * simulation.until for share in _SHARES)):
+    for end in (simulation.control.first, *(share * simulation.until for share in _SHARES)):
         begun = perf_counter()
         begin(problem, end)
         outcome = problem.solve()
