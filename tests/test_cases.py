@@ -318,7 +318,8 @@ def test_settings_that_are_refused(written, key, text, words):
         ("1e3 kg/m^3", "density", 1e-9), ("5 %", "one", 0.05), ("-3 cm", "length", -30),
         ("20 degC", "temperature", 293.15),
         ("2 MPa·s", "viscosity", 2), ("1 W/(m K)", "conductivity", 1), ("1 J/(kg K)", "specific heat", 1e6),
-        ("1e-4 1/degC", "expansion", 1e-4),
+        ("1e-4 1/degC", "expansion", 1e-4), ("5 degC", "temperature difference", 5),
+        ("0.1 K", "temperature difference", 0.1),
     ],
 )  # fmt: skip
 def test_quantities(text, kind, value):

@@ -33,6 +33,7 @@ DIMENSIONS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
         "flux": (-1, 1, -1, 0),
         "entropy": (1, 1, 0, -1),
         "one": (0, 0, 0, 0),
+        "temperature difference": (0, 0, 0, 1),
         "acceleration": (1, 0, -2, 0),
         "force per volume": (-3, 1, 0, 0),
         "stiffness": (-3, 1, 0, 0),
@@ -99,6 +100,7 @@ Toughness = Annotated[float, Kind("toughness")]
 Angle = Annotated[float, Kind("angle")]
 Velocity = Annotated[float, Kind("velocity")]
 TemperatureValue = Annotated[float, Kind("temperature")]
+TemperatureDifference = Annotated[float, Kind("temperature difference")]
 Flux = Annotated[float, Kind("flux")]
 Stiffness = Annotated[float, Kind("stiffness")]
 Viscosity = Annotated[float, Kind("viscosity")]

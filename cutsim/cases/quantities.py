@@ -110,6 +110,8 @@ class Converter:
             raise ValueError(f"{symbol!r} is no unit of {words(kind)}")
         if not set(given.dimensionality) <= set(_BASE):
             raise ValueError(f"{symbol!r} is no unit of length, force, time and temperature")
+        if kind is not None and kind.name == "temperature difference" and given.units == unit("degC"):
+            return value
         if _angular(given):
             return float(given.to("radian").magnitude)
         target = unit("dimensionless")
@@ -134,5 +136,4 @@ def _is(quantity: Any, kind: Kind) -> bool:
 def words(kind: Kind) -> str:
     """A kind of quantity with its article."""
     name = {"one": "number without unit", "expansion": "quantity per temperature"}.get(kind.name, kind.name)
-    article = "" if name in ("viscosity", "interface viscosity", "heat capacity per area", "specific heat") else "a"
-    return f"{article}{'n' if article and name[0] in 'aeiou' else ''} {name}".strip()
+    return f"a{'n' if name[0] in 'aeiou' else ''} {name}"

@@ -4,7 +4,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Tag
 
-from cutsim.base.units import Conductance, Conductivity, Density, SpecificHeat, TemperatureValue, Time
+from cutsim.base.units import (
+    Conductance,
+    Conductivity,
+    Density,
+    SpecificHeat,
+    TemperatureDifference,
+    TemperatureValue,
+    Time,
+)
 from cutsim.cases.constructed import FromTable
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyName, CrackName, Groups, PairName, ToolName
@@ -113,7 +121,7 @@ class Heat(Table):
     """
 
     initial: TemperatureValue
-    iterate: TemperatureValue | None = None
+    iterate: TemperatureDifference | None = None
     bodies: dict[BodyName, HeatBody] = Field(min_length=1)
     cracks: dict[CrackName, Annotated[ContactHeat, FromTable()]] = Field(default_factory=dict)
     pairs: dict[PairName, Annotated[ContactHeat, FromTable()]] = Field(default_factory=dict)
