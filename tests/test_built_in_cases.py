@@ -152,3 +152,9 @@ def test_the_page_on_case_files_names_all():
     page = (Path(__file__).parents[1] / "docs" / "case_files.md").read_text(encoding="utf-8")
     section = page.partition("## Cases that come with cutsim")[2].partition("\n## ")[0]
     assert set(re.findall(r"`([a-z-]+)`", section)) - {"extends"} == set(CASES)
+
+
+def test_a_front_is_found_also_where_it_goes_down():
+    simulation = read_case(CASES["fast-tear"], quick=True).build(COMM)
+    report = steps(simulation.run, 1)[0]
+    assert simulation.columns(report.columns)["front"][0] == pytest.approx(-12.0, abs=1.0), "the end of the cut"

@@ -33,10 +33,10 @@ def _measure(domain: Domain, parts: Parts, name: str, table: schema.Front | sche
     key = ("measures", name)
     if isinstance(table, schema.Front):
         crack = parts.cracks[table.crack]
-        axis = "xyz".index(table.axis)
+        axis, backwards = "xyz".index(table.axis[-1]), table.axis.startswith("-")
         if axis >= domain.tagged.mesh.geometry.dim:
             raise refused(domain.document, (*key, "axis"), "must be x or y: the mesh has two dimensions", table.axis)
-        return partial(crack_front, crack, axis, table.quantity, table.level), "length"
+        return partial(crack_front, crack, axis, table.quantity, table.level, backwards=backwards), "length"
     solid = next(solid for solid in parts.solids if solid.name == table.body)
     with refusing(domain.document, *key):
         length = 1.0 if table.length is None else table.length

@@ -136,7 +136,9 @@ def crack_profile(crack: Crack, name: str, axis: int = 0) -> tuple[Array, Array]
     return places, np.bincount(column, values) / np.bincount(column)
 
 
-def crack_front(crack: Crack, axis: int = 0, name: str = "damage", level: float = 0.5) -> float:
+def crack_front(
+    crack: Crack, axis: int = 0, name: str = "damage", level: float = 0.5, *, backwards: bool = False
+) -> float:
     """Place where a quantity falls below a level along the coordinate in which the crack grows [length]. Collective.
 
     Args:
@@ -144,9 +146,11 @@ def crack_front(crack: Crack, axis: int = 0, name: str = "damage", level: float 
         axis: The coordinate.
         name: As for `Crack.point_values`.
         level: Level; by default the front is where the damage is one half.
+        backwards: Whether the crack grows against the coordinate.
     """
     places, values = crack_profile(crack, name, axis)
-    return float(np.interp(-level, -values, places))
+    order = slice(None, None, -1 if backwards else 1)
+    return float(np.interp(-level, -values[order], places[order]))
 
 
 def plane_modulus(young: float, poisson: float, plane: Literal["strain", "stress"] = "strain") -> float:
