@@ -1,5 +1,6 @@
 """The command: what it understands, how it ends, and how it starts ranks."""
 
+import csv
 import errno
 import json
 import os
@@ -24,6 +25,7 @@ from cutsim.commands.endings import Ending, endings
 from cutsim.commands.jobs import Job, Runner
 from cutsim.commands.main import COMMANDS, app
 from cutsim.commands.variation import Variation, variants
+from cutsim.results.output import read_history
 
 runner = CliRunner()
 COARSE = [0, 1, 2, 3, 4]
@@ -204,7 +206,8 @@ def make_result(folder, depth, force, *, until=None, verdict="trusted", unit="mm
     folder.mkdir()
     rows = [f"depth [{unit}],force [N],cuts", *(f"{d},{f},0" for d, f in zip(depth, force, strict=True))]
     (folder / "history.csv").write_text("\n".join(rows) + "\n")
-    summary = {"verdict": verdict, "reasons": [], "time": depth[-1], "until": until or depth[-1]}
+    reasons = ["interrupted at time 2"] if until else []
+    summary = {"verdict": verdict, "reasons": reasons, "time": depth[-1], "until": until or depth[-1]}
     (folder / "summary.json").write_text(json.dumps(summary))
     return str(folder)
 
@@ -225,7 +228,7 @@ def test_compare_measures_over_the_common_range(tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     assert "from 0 to 2" in result.stdout
     assert cells(result, "whole") == ["whole", "trusted", "4", "4"]
-    assert cells(result, "short")[1:] == ["ends", "early", "6", "+50.00%", "6", "+50.00%", "1.15", "28.87%"]
+    assert cells(result, "short")[1:] == ["interrupted", "6", "+50.00%", "6", "+50.00%", "1.15", "28.87%"]
     assert cells(result, "machine.txt")[1:6] == ["measured", "5", "+25.00%", "5", "+25.00%"]
     assert Path("compared.png").stat().st_size > 5000
 
@@ -241,12 +244,134 @@ def test_compare_refuses_what_has_nothing_in_common(tmp_path):
 
 def test_plot_lists_and_draws_columns(tmp_path):
     folder = make_result(tmp_path / "run", COARSE, COARSE)
-    assert runner.invoke(app, ["plot", folder, "--list"]).stdout == "depth [mm]: 4\nforce [N]: 4\ncuts: 0\n"
+    assert runner.invoke(app, ["plot", folder, "--list"]).stdout == "depth [mm] 4\nforce [N] 4\ncuts 0\n"
     path = tmp_path / "plot.svg"
     assert runner.invoke(app, ["plot", folder, "-y", "force", "-o", str(path)]).exit_code == 0
     assert path.read_text().startswith("<?xml")
     wrong = runner.invoke(app, ["plot", folder, "-y", "forse"])
     assert wrong.exit_code == 2 and "depth, force, cuts" in wrong.stderr
+
+
+@pytest.fixture
+def bar(tmp_path, monkeypatch):
+    """A case that runs in a second: a square that is stretched, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    Path("bar.toml").write_text(BAR)
+    return tmp_path
+
+
+BAR = """title = "Bar"
+[mesh]
+geometry = "block"
+dim = 2
+set = { Lx = 1, H = 1, notch = 0, lc = 0.5, band = 0.5 }
+[material]
+model = "linear-elastic"
+young = 1.0  # Young's modulus [MPa]
+poisson = 0.0
+[supports.held]
+facets = "far_left"
+direction = "all"
+[supports.pulled]
+facets = "far_right"
+direction = "x"
+value = "t"
+[analysis]
+until = 0.1
+[steps]
+fixed = 0.02
+[output]
+every = 0
+report = false
+"""
+
+
+def test_a_case_is_run_and_not_run_over(bar):
+    """The force is that of the stretch in small strains, E H u / (2 Lx)."""
+    ran = runner.invoke(app, ["run", "bar.toml", "--set", "material.young=4 MPa"])
+    assert (ran.exit_code, ran.stdout.splitlines()[-1]) == (0, "results: results/bar"), ran.output
+    history = read_history("results/bar/history.csv")
+    np.testing.assert_allclose(history["pulled_force"], 2 * history["time"], rtol=1e-9)
+    assert 'young = "4 MPa"' in Path("results/bar/case.toml").read_text()
+    again = runner.invoke(app, ["run", "bar.toml"])
+    assert again.exit_code == 2 and "--overwrite" in again.stderr
+    quiet = runner.invoke(app, ["run", "bar.toml", "--overwrite", "-q"])
+    assert (quiet.exit_code, quiet.output) == (0, "")
+
+
+def test_all_that_is_wrong_in_a_case_is_said_and_nothing_else(bar):
+    wrong = runner.invoke(app, ["run", "bar.toml", "--set", "material.yung=1", "--set", "steps.fixed=-1"])
+    assert wrong.exit_code == 2 and not wrong.stdout and not Path("results").exists()
+    lines = wrong.stderr.splitlines()
+    assert (
+        len(lines) == 2 and all(line.startswith("--set ") for line in lines) and "did you mean 'young'" in wrong.stderr
+    )
+    assert runner.invoke(app, ["run", "bar.toml", "--set", "steps.fixed"]).exit_code == 2
+
+
+def test_a_case_is_checked_and_nothing_but_a_picture_is_written(bar):
+    checked = runner.invoke(app, ["check", "bar.toml"])
+    assert checked.exit_code == 0, checked.output
+    assert cells(checked, "groups     far_left")[2:] == ["2", "facets"]
+    assert sorted(path.name for path in bar.iterdir()) == ["bar-setup.png", "bar.toml"]
+    free = runner.invoke(app, ["check", "bar.toml", "--set", "supports.held.direction=x"])
+    assert free.exit_code == 1 and "against it: supports: body 'body' can slide along y" in free.stdout
+
+
+def test_a_sweep_goes_on_where_it_was(bar):
+    arguments = ["sweep", "bar.toml", "--vary", "material.young=1,2", "-j", "2", "-o", "sweep"]
+    first = runner.invoke(app, arguments)
+    assert first.exit_code == 0, first.output
+    assert {path.name for path in Path("sweep").iterdir()} >= {"young=1", "young=2", "sweep.png", "report.html"}
+    with open("sweep/sweep.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert [(row["material.young"], row["ended"]) for row in rows] == [("1", "trusted"), ("2", "trusted")]
+    assert float(rows[1]["largest_pulled_force"]) == pytest.approx(2 * float(rows[0]["largest_pulled_force"]))
+    written = [Path(f"sweep/young={young}/history.csv").stat().st_mtime_ns for young in (1, 2)]
+    Path("sweep/young=1/history.csv").unlink()
+    again = runner.invoke(app, arguments)
+    assert "1 of which have ended before" in again.stdout and again.exit_code == 0
+    after = [Path(f"sweep/young={young}/history.csv").stat().st_mtime_ns for young in (1, 2)]
+    assert after[0] > written[0] and after[1] == written[1]
+    other = runner.invoke(app, [*arguments, "--set", "material.poisson=0.1"])
+    assert other.exit_code == 2 and "of another case" in other.stderr
+
+
+def test_a_value_is_fitted(bar):
+    Path("curve.csv").write_text("way [mm],load [N]\n" + "".join(f"{u},{0.75 * u}\n" for u in (0.03, 0.05, 0.06, 0.09)))
+    curve = 'output.curve=["pulled_displacement", "pulled_force"]'
+    arguments = ["fit", "bar.toml", "curve.csv", "-o", "fit", "--free", "material.young=1:0.5:3", "--set", curve]
+    result = runner.invoke(app, arguments)
+    assert result.exit_code == 0 and "material.young = 1.5 " in result.stdout, result.output
+    assert tomllib.loads(Path("fit/fitted.toml").read_text())["material"]["young"] == pytest.approx(1.5)
+    assert Path("fit/fit.png").exists()
+    simulated = Path("fit/simulations.jsonl").read_text()
+    assert runner.invoke(app, arguments).exit_code == 0
+    assert Path("fit/simulations.jsonl").read_text() == simulated, "nothing is simulated twice"
+    unknown = runner.invoke(app, [*arguments, "--free", "body.viscosity"])
+    assert unknown.exit_code == 2 and "first guess" in unknown.stderr
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_an_interrupted_run_is_kept_and_resumed(bar, ranks):
+    """Without a terminal: no control characters."""
+    settings = ["--set", "steps.fixed=2e-5", "-n", str(ranks)]
+    job = start("-m", "cutsim", "run", "bar.toml", *settings, cwd=bar)
+    history = bar / "results" / "bar" / "history.csv"
+    deadline = time.monotonic() + 120
+    while not (history.exists() and history.read_text().count("\n") > 3) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    job.send_signal(signal.SIGINT)
+    out, err = job.communicate(timeout=120)
+    assert job.returncode == Ending.INTERRUPTED, err
+    assert "cutsim resume" in out and not set("\x1b\r\x08") & set(out + err)
+    rows = len(read_history(history)["time"])
+    assert 3 <= rows < 5000
+    case = bar / "results" / "bar" / "case.toml"
+    case.write_text(case.read_text().replace("until = 0.1", f"until = {(rows + 3) * 2e-5}"))
+    resumed = runner.invoke(app, ["resume", "results/bar", "-q"])
+    assert resumed.exit_code == 0, resumed.output
+    assert len(read_history(history)["time"]) == rows + 3
 
 
 def test_a_material_is_fitted(tmp_path):

@@ -42,41 +42,14 @@ def command(
     Measured files give their units in the header, such as "force [kN]", or in a line below it. Peak, work and
     difference are those of the range that all curves have in common.
     """
-    from cutsim.commands.folders import read_sources
+    from cutsim.commands.folders import overlaid, read_sources
 
     found = read_sources(sources, (x, y), (csv_x, csv_y))
     table = _differences(found)
-    plot_sources(output, found)
+    overlaid(found).plot(output)
     screen = console()
     screen.print(table)
     screen.print(f"written: {output}", markup=False)
-
-
-def plot_sources(path: Path, sources: list[Source], title: str = "") -> None:
-    """Plot curves over each other in the units of the first; one that ends early is dashed, a measured one dotted.
-
-    Args:
-        path: The file.
-        sources: The curves.
-        title: Text above the plot.
-
-    Raises:
-        ValueError: The units of a curve are those of another quantity.
-    """
-    from cutsim.results.plots import Curve, plot_curves
-
-    first = sources[0]
-    curves = [
-        Curve(
-            s.x.in_unit(first.x.unit),
-            s.y.in_unit(first.y.unit),
-            s.label if s.verdict in ("trusted", "measured") else f"{s.label}: {s.verdict}",
-            ":" if s.verdict == "measured" else "-" if s.verdict == "trusted" else "--",
-            partial=not s.complete,
-        )
-        for s in sources
-    ]
-    plot_curves(path, curves, xlabel=first.x.label, ylabel=first.y.label, title=title)
 
 
 def _differences(sources: list[Source]) -> Table:
@@ -85,7 +58,7 @@ def _differences(sources: list[Source]) -> Table:
 
     first = sources[0]
     x, curves = _sampled(sources)
-    unit, work = first.y.unit, f"{first.y.unit}·{first.x.unit}"
+    unit, work = first.y.unit or "1", f"{first.y.unit}·{first.x.unit}".strip("·") or "1"
     table = Table("curve", "verdict", f"peak [{unit}]", "", f"work [{work}]", "", f"rms [{unit}]", "", box=None)
     table.caption = f"{first.x.label} from {x[0]:.4g} to {x[-1]:.4g}; each beside the first"
     table.caption_justify, table.header_style = "left", "bold"
@@ -93,7 +66,7 @@ def _differences(sources: list[Source]) -> Table:
         off = y - curves[0]  # linear between the abscissae
         squares = (off[1:] ** 2 + off[1:] * off[:-1] + off[:-1] ** 2) / 3
         rms = np.sqrt(squares @ np.diff(x) / (x[-1] - x[0]))
-        cells = [source.label, source.verdict]
+        cells = [source.label, source.grade]
         for value, base in ((y.max(), curves[0].max()), (np.trapezoid(y, x), np.trapezoid(curves[0], x))):
             cells += [f"{value:.5g}", f"{value / base - 1:+.2%}" if base and source is not first else ""]
         table.add_row(*cells, *([f"{rms:.3g}", f"{rms / curves[0].max():.2%}"] if source is not first else ["", ""]))
@@ -111,7 +84,7 @@ def _sampled(sources: list[Source]) -> tuple[Numbers, list[Numbers]]:
 
     curves = []
     for source in sources:
-        x, y = source.x.in_unit(sources[0].x.unit), source.y.in_unit(sources[0].y.unit)
+        x, y = source.within(sources[0].x.unit, sources[0].y.unit)
         further = np.flatnonzero(np.diff(np.maximum.accumulate(x), prepend=-np.inf) > 0)
         curves.append((x[further], y[further]))
     low, high = max(x[0] for x, _ in curves), min(x[-1] for x, _ in curves)

@@ -104,24 +104,24 @@ def command(
 
 def _stretch(path: Path, title: str | None, length: float | None) -> Vector:
     """Stretches of a test."""
-    from cutsim.commands.folders import read_axes
+    from cutsim.commands.folders import read_columns
     from cutsim.identify import titled_units
 
     if length is not None:
-        (travel,) = read_axes(path, {"displacement": title})
+        (travel,) = read_columns(path, {"displacement": title})
         return 1 + travel.values / length
     named = [title] if title else titled_units(path)
     kind = "stretch" if any("stretch" in name.lower() for name in named) else "strain"
-    (axis,) = read_axes(path, {kind: title})
-    return axis.values if kind == "stretch" else 1 + axis.values
+    (column,) = read_columns(path, {kind: title})
+    return column.values if kind == "stretch" else 1 + column.values
 
 
 def _stress(path: Path, title: str | None, area: float | None) -> Vector:
     """Nominal stresses of a test [MPa]."""
-    from cutsim.commands.folders import read_axes
+    from cutsim.commands.folders import read_columns
 
-    (axis,) = read_axes(path, {"force" if area else "stress": title})
-    return axis.values / (area or 1.0)
+    (column,) = read_columns(path, {"force" if area else "stress": title})
+    return column.values / (area or 1.0)
 
 
 def _shear(test: StressTest) -> float:

@@ -1,122 +1,27 @@
-"""What a run has left in its folder, and what a testing machine has left in a file, as curves."""
+"""Curves of runs and of measurements: what runs have left in their folders, and machines in their files."""
 
 from __future__ import annotations
 
-import csv
-import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import pint
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.units import Units
 from cutsim.identify.measurements import fitting_columns, read_table, titled_units
-from cutsim.results.output import read_history
+from cutsim.results.overlay import Overlay
+from cutsim.results.plots import Curve
+from cutsim.results.run_files import Column, RunFiles
 
-#: Columns that a history is drawn over, and those that are drawn: the first that there is.
-_ABSCISSAE = ("depth", "displacement", "time")
-_ORDINATES = ("force", "reaction")
-
-
-@dataclass(frozen=True)
-class Axis:
-    """A column of numbers.
-
-    Attributes:
-        name: What the numbers are.
-        unit: Their unit; "1" for none.
-        values: The numbers.
-    """
-
-    name: str
-    unit: str
-    values: NDArray[np.float64]
-
-    @property
-    def label(self) -> str:
-        """Name and unit, for an axis of a plot."""
-        return self.name if self.unit == "1" else f"{self.name} [{self.unit}]"
-
-    def in_unit(self, unit: str) -> NDArray[np.float64]:
-        """The numbers in another unit.
-
-        Raises:
-            ValueError: It is a unit of another quantity.
-        """
-        if unit == self.unit:
-            return self.values
-        try:
-            return np.asarray(pint.get_application_registry().Quantity(self.values, self.unit).to(unit).magnitude)
-        except pint.PintError as error:
-            raise ValueError(f"{self.name} in {self.unit} cannot be compared with {unit}: {error}") from None
-
-
-@dataclass(frozen=True)
-class Result:
-    """Result of a run.
-
-    Args:
-        folder: Its folder.
-
-    Raises:
-        FileNotFoundError: It has no history.
-    """
-
-    folder: Path
-
-    def __post_init__(self) -> None:
-        if not self.history.exists():
-            raise FileNotFoundError(f"{self.folder} is no folder of a run: it has no history.csv")
-
-    @property
-    def history(self) -> Path:
-        """The table with a row for each step."""
-        return self.folder / "history.csv"
-
-    @cached_property
-    def summary(self) -> dict[str, Any]:
-        """Verdict and headline numbers; empty if the run was killed or goes on."""
-        path = self.folder / "summary.json"
-        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-
-    @property
-    def complete(self) -> bool:
-        """Whether the run came to its end."""
-        return bool(self.summary) and self.summary["time"] >= self.summary["until"] * (1 - 1e-9)
-
-    @property
-    def verdict(self) -> str:
-        """What is to be thought of it in a word or two."""
-        return self.summary["verdict"] if self.complete else "ends early"
-
-    @cached_property
-    def columns(self) -> dict[str, Axis]:
-        """Its columns by name."""
-        with self.history.open(encoding="utf-8", newline="") as file:
-            header = next(csv.reader(file), [])
-        units = [label.partition(" [")[2].rstrip("]") or "1" for label in header]
-        values = read_history(self.history) if header else {}
-        return {name: Axis(name, unit, values[name]) for name, unit in zip(values, units, strict=True)}
-
-    def column(self, name: str) -> Axis:
-        """A column.
-
-        Raises:
-            ValueError: There is none of this name.
-        """
-        require(f"column of {self.history}", name, name in self.columns, "one of " + ", ".join(self.columns))
-        return self.columns[name]
-
-    def main(self, names: tuple[str, ...], unit: str) -> Axis:
-        """The column that shows the run best: the first of some names, else the first in a unit or the last one."""
-        fitting = [name for name in names if name in self.columns]
-        fitting += [name for name, axis in self.columns.items() if axis.unit == unit]
-        return self.column([*fitting, *list(self.columns)[-1:]][0])
+#: How measured curves and those of runs are drawn; all others are dashed.
+_STYLES = {"measured": ":", "trusted": "-"}
+#: Kinds of quantities, for the units in which a measured table is read.
+_KINDS = {"displacement": "length"}
 
 
 @dataclass(frozen=True)
@@ -127,19 +32,79 @@ class Source:
         label: What it is called in a plot: the folder, or the file.
         x: Abscissae.
         y: Ordinates.
-        verdict: Verdict of a run; "measured" for a measured one.
+        grade: What is to be thought of a run, in a word; "measured" for a measurement.
         complete: Whether it is whole.
     """
 
     label: str
-    x: Axis
-    y: Axis
-    verdict: str = "measured"
+    x: Column
+    y: Column
+    grade: str = "measured"
     complete: bool = True
 
     def called(self, label: str) -> Self:
         """The curve under another label."""
         return replace(self, label=label)
+
+    def within(self, x: str, y: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The curve in other units.
+
+        Raises:
+            ValueError: They are units of other quantities.
+        """
+        return in_unit(self.x, x), in_unit(self.y, y)
+
+
+def in_unit(column: Column, unit: str) -> NDArray[np.float64]:
+    """Numbers of a column in another unit.
+
+    Raises:
+        ValueError: It is a unit of another quantity.
+    """
+    if unit == column.unit:
+        return column.values
+    try:
+        quantity = pint.get_application_registry().Quantity(column.values, column.unit or "1")
+        return np.asarray(quantity.to(unit or "1").magnitude)
+    except pint.PintError as error:
+        raise ValueError(f"{column.label} cannot be compared with [{unit or 1}]: {error}") from None
+
+
+def overlaid(sources: Sequence[Source]) -> Overlay:
+    """Curves in one frame, in the units of the first; runs that are not to be trusted are dashed, measurements dotted.
+
+    Raises:
+        ValueError: The units of a curve are those of other quantities.
+    """
+    first = sources[0]
+    curves = []
+    for source in sources:
+        x, y = source.within(first.x.unit, first.y.unit)
+        label = f"{source.label}, {source.grade}" if source.grade == "questionable" else source.label
+        curves.append(Curve(x, y, label, _STYLES.get(source.grade, "--"), partial=not source.complete))
+    return Overlay(tuple(curves), first.x.label, first.y.label)
+
+
+def run_files(folder: Path) -> RunFiles:
+    """Files of a run.
+
+    Raises:
+        FileNotFoundError: There is no such folder, or it has no history.
+    """
+    run = RunFiles.read(folder)
+    if not run.history:
+        raise FileNotFoundError(f"{folder} is no folder of a run: {'; '.join(run.missing) or 'its history is empty'}")
+    return run
+
+
+def run_column(run: RunFiles, name: str) -> Column:
+    """A column of a history.
+
+    Raises:
+        ValueError: There is none of this name.
+    """
+    require(f"column of {run.folder}", name, name in run.history, "one of " + ", ".join(run.history))
+    return run.history[name]
 
 
 def read_source(path: Path, x: str | None = None, y: str | None = None) -> Source:
@@ -147,24 +112,22 @@ def read_source(path: Path, x: str | None = None, y: str | None = None) -> Sourc
 
     Args:
         path: Folder of a run, or file of a testing machine.
-        x: Column of the abscissae; of a file also "title:unit" where it does not give the unit itself. By default depth
-            or displacement.
-        y: That of the ordinates; the force by default.
+        x: Column of the abscissae; of a file also "title:unit" where it does not give the unit itself. By default that
+            of the main curve, or a displacement.
+        y: That of the ordinates; by default that of the main curve, or the force.
 
     Raises:
         ValueError: There is no such column, or the file is refused.
         OSError: Folder or file cannot be read.
     """
     label = path.resolve().name
-    if path.is_dir():
-        result = Result(path)
-        abscissa = result.column(x) if x else result.main(_ABSCISSAE, "mm")
-        ordinate = result.column(y) if y else result.main(_ORDINATES, "N")
-        return Source(label, abscissa, ordinate, result.verdict, result.complete)
-    if not path.exists():
-        raise FileNotFoundError(f"there is neither a folder nor a file {path}")
-    abscissa, ordinate = read_axes(path, {"displacement": x, "force": y})
-    return Source(label, abscissa, ordinate)
+    if path.is_file():
+        abscissae, ordinates = read_columns(path, {"displacement": x, "force": y})
+        return Source(label, abscissae, ordinates)
+    run = run_files(path)
+    main = run.curve or (next(iter(run.history)), list(run.history)[-1])
+    abscissae, ordinates = run_column(run, x or main[0]), run_column(run, y or main[1])
+    return Source(label, abscissae, ordinates, run.judgement.grade, run.complete)
 
 
 def read_sources(
@@ -177,29 +140,31 @@ def read_sources(
         run: Columns of abscissae and ordinates in runs; see `read_source`.
         file: The same in files.
     """
-    sources = [read_source(path, *(run if path.is_dir() else file)) for path in paths]
+    sources = [read_source(path, *(file if path.is_file() else run)) for path in paths]
     if len({source.label for source in sources}) < len(sources):
         sources = [source.called(str(path)) for source, path in zip(sources, paths, strict=True)]
     return sources
 
 
-def read_axes(path: Path, columns: dict[str, str | None]) -> list[Axis]:
+def read_columns(path: Path, columns: Mapping[str, str | None], units: Units | None = None) -> list[Column]:
     """Columns of a measured table.
 
     Args:
         path: The file.
         columns: Quantity → title of its column, with ":unit" where the file does not give it; None where the first
             column in a unit of this quantity is meant.
+        units: Units of the result; mm, N, s, K by default.
 
     Raises:
         ValueError: There is no such column, or the file is refused.
         OSError: The file cannot be read.
     """
+    units = units or Units()
     unknown = [quantity for quantity, title in columns.items() if title is None]
     chosen = fitting_columns(path, unknown) if unknown else {}
     chosen |= {quantity: _column(path, title) for quantity, title in columns.items() if title is not None}
-    table = read_table(path, {quantity: chosen[quantity] for quantity in columns})
-    return [Axis(quantity, _unit(quantity), table[quantity]) for quantity in columns]
+    table = read_table(path, {quantity: chosen[quantity] for quantity in columns}, units=units)
+    return [Column(quantity, _unit(quantity, units), values) for quantity, values in table.items()]
 
 
 def _column(path: Path, title: str) -> tuple[str, str]:
@@ -208,12 +173,12 @@ def _column(path: Path, title: str) -> tuple[str, str]:
     if title in units:
         return title, units[title]
     name, colon, unit = title.rpartition(":")
-    require(
-        f"column of {path}", title, bool(colon), "'title:unit', or one of " + (", ".join(units) or "none with a unit")
-    )
+    known = ", ".join(units) or "none with a unit"
+    require(f"column of {path}", title, bool(colon), f"'title:unit', or one of {known}")
     return name, unit
 
 
-def _unit(quantity: str) -> str:
+def _unit(quantity: str, units: Units) -> str:
     """Unit in which a table is read."""
-    return {"force": "N", "displacement": "mm", "stress": "MPa"}.get(quantity, "1")
+    kind = _KINDS.get(quantity, quantity)
+    return "" if kind in ("strain", "stretch") else units.of(kind)

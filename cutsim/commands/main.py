@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+from itertools import takewhile
 from types import ModuleType
 from typing import Annotated, Any
 
@@ -11,15 +12,31 @@ import typer
 from typer.core import TyperGroup
 
 import cutsim
-from cutsim.commands import cases, compare, doctor, fit_material, launch, new, plot
+from cutsim.commands import (
+    animate,
+    cases,
+    check,
+    compare,
+    doctor,
+    fit,
+    fit_material,
+    launch,
+    new,
+    plot,
+    report,
+    resume,
+    run,
+    sweep,
+)
 from cutsim.commands.endings import endings
-from cutsim.commands.options import show_messages
+from cutsim.commands.options import show_messages, talking
 
 #: Heading of the help → commands: name → module with the function `command` and its `EXAMPLES`.
 COMMANDS: dict[str, dict[str, ModuleType]] = {
-    "Begin": {"cases": cases, "new": new},
-    "Look at results": {"plot": plot, "compare": compare},
-    "Find parameters": {"fit-material": fit_material},
+    "Begin": {"cases": cases, "new": new, "check": check},
+    "Simulate": {"run": run, "resume": resume, "sweep": sweep},
+    "Look at results": {"plot": plot, "compare": compare, "report": report, "animate": animate},
+    "Find parameters": {"fit": fit, "fit-material": fit_material},
     "Help": {"doctor": doctor},
 }
 
@@ -61,10 +78,18 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Exit codes: 0 trusted, 1 questionable, 2 bad input, 3 no equilibrium, 4 cannot write, 130 interrupted.",
 )
+
+
+def _help(module: ModuleType) -> str:
+    """What a command is for: its docstring, of which each paragraph is a line, up to its sections."""
+    paragraphs = [" ".join(lines.split()) for lines in (module.command.__doc__ or "").split("\n\n")]
+    return "\n\n".join(takewhile(lambda text: not text.startswith(("Args:", "Raises:")), paragraphs))
+
+
 for panel, commands in COMMANDS.items():
     for name, module in commands.items():
         epilog = "\n\n".join(["[bold]Examples[/bold]", *(f"  $ {example}" for example in module.EXAMPLES)])
-        app.command(name, epilog=epilog, rich_help_panel=panel)(module.command)
+        app.command(name, help=_help(module), epilog=epilog, rich_help_panel=panel)(talking(module.command))
 
 
 def main() -> None:

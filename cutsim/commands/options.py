@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import sys
-from typing import Annotated
+from collections.abc import Callable
+from functools import wraps
+from inspect import Parameter
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -47,7 +51,32 @@ def _quieter(quiet: bool) -> bool:
     return quiet
 
 
-Verbose = Annotated[
+def talking(command: Callable[..., None]) -> Callable[..., None]:
+    """A command that also takes ``--verbose`` and ``--quiet``.
+
+    Args:
+        command: The command.
+    """
+    signature = inspect.signature(command, eval_str=True)
+    options = {"verbose": (_Verbose, 0), "quiet": (_Quiet, False)}
+
+    @wraps(command)
+    def talk(*, verbose: int, quiet: bool, **values: Any) -> None:
+        command(**values)
+
+    further = [Parameter(n, Parameter.KEYWORD_ONLY, default=d, annotation=a) for n, (a, d) in options.items()]
+    # what typer reads of a function
+    talk.__annotations__ |= {name: annotation for name, (annotation, _) in options.items()}
+    vars(talk)["__signature__"] = signature.replace(parameters=[*signature.parameters.values(), *further])
+    return talk
+
+
+def quiet() -> bool:
+    """Whether nothing is to be said but what is wrong."""
+    return logger.level > logging.WARNING
+
+
+_Verbose = Annotated[
     int,
     typer.Option(
         "--verbose",
@@ -59,7 +88,7 @@ Verbose = Annotated[
         help="Say more: decisions of the run; twice: those of the solvers too.",
     ),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_quieter, help="Say nothing but what is wrong.")]
+_Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_quieter, help="Say nothing but what is wrong.")]
 Ranks = Annotated[int, typer.Option("-n", "--ranks", min=1, help="MPI ranks on this machine, which are started here.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an older run has left in the folder.")]
 

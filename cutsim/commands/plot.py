@@ -28,17 +28,17 @@ def command(
     ] = False,
 ) -> None:
     """Plot columns of the histories of one or more runs."""
-    from cutsim.commands.compare import plot_sources
-    from cutsim.commands.folders import Result, read_source
+    from cutsim.commands.folders import overlaid, read_source, run_files
 
     screen = console()
     if list_columns:
-        for axis in Result(folders[0]).columns.values():
-            screen.print(f"{axis.label}: {axis.values[-1]:.6g}" if len(axis.values) else axis.label, markup=False)
+        for column in run_files(folders[0]).history.values():
+            unit = f" [{column.unit}]" if column.unit else ""
+            screen.print(f"{column.name}{unit}", *(f"{value:.6g}" for value in column.values[-1:]), markup=False)
         return
     ordinates: list[str | None] = [*y] if y else [None]
     sources = [read_source(folder, x, name) for folder in folders for name in ordinates]
     if len(ordinates) > 1:
         sources = [s.called(s.y.name if len(folders) == 1 else f"{s.label}, {s.y.name}") for s in sources]
-    plot_sources(output, sources)
+    overlaid(sources).plot(output)
     screen.print(f"written: {output}", markup=False)
