@@ -7,14 +7,14 @@ from pydantic import AfterValidator, Field, ValidationInfo, ValidatorFunctionWra
 
 from cutsim.base.units import Units
 from cutsim.cases.constructed import FromTable
-from cutsim.cases.expressions import RESERVED
+from cutsim.cases.expressions import RESERVED, TimeValue
 from cutsim.cases.quantities import consistent
 from cutsim.cases.schema_heat import Heat
 from cutsim.cases.schema_materials import AnyMaterial, Law
 from cutsim.cases.schema_mesh import Mesh, Selection
 from cutsim.cases.schema_parts import AnyTool, Body, Crack, Layer, Load, Pair, Support
 from cutsim.cases.schema_run import Analysis, AnyInsertion, Measure, Output, Solver, Steps
-from cutsim.cases.tables import Free, Table
+from cutsim.cases.tables import Table, Varying
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.materials.elastic import Material
 
@@ -37,13 +37,13 @@ class Header(Table):
         title: What is simulated, in a few words.
         extends: Case file that this one adds to and changes, relative to this one.
         units: Units of plain numbers and of all output; consistent ones follow from these.
-        parameters: Numbers of your own, for use in expressions.
+        parameters: Numbers or functions of time of your own, for use in expressions.
     """
 
     title: str = ""
     extends: str | None = None
     units: Annotated[Units, FromTable(), AfterValidator(consistent)] = Field(default_factory=Units)
-    parameters: dict[Parameter, Free] = Field(default_factory=dict)
+    parameters: dict[Parameter, Annotated[TimeValue, Varying(None)]] = Field(default_factory=dict)
 
 
 class Parts(Table):

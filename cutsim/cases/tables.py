@@ -55,11 +55,11 @@ class Varying:
     """Annotation of a number that may be a function of time, as a quantity, an expression in t or a table of points.
 
     Args:
-        kind: What it is, one of `cutsim.base.units.KINDS`.
+        kind: What it is, one of `cutsim.base.units.KINDS`; None for anything.
     """
 
-    def __init__(self, kind: str) -> None:
-        self.kind = Kind(kind)
+    def __init__(self, kind: str | None) -> None:
+        self.kind = None if kind is None else Kind(kind)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
         """How it is read."""
@@ -71,7 +71,7 @@ class Varying:
         """What may be written."""
         numbers = {"type": "array", "items": _NUMBER}
         table = {"type": "object", "properties": {"times": numbers, "values": numbers}, "required": ["times", "values"]}
-        return {"anyOf": [*_NUMBER["anyOf"], table], "x-kind": self.kind.name}
+        return {"anyOf": [*_NUMBER["anyOf"], table]} | ({} if self.kind is None else {"x-kind": self.kind.name})
 
 
 def _whole(value: Any, info: ValidationInfo) -> int:
