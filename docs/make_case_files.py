@@ -14,7 +14,7 @@ from cutsim.cases.keys import SINGULAR
 PAGE = Path(__file__).parent / "case_files.md"
 MARK = "<!-- What follows is written by docs/make_case_files.py from the schema. -->\n"
 SCHEMA = case_schema()
-TABLES = SCHEMA["$defs"]
+TABLES = SCHEMA["definitions"]
 SHORT = {plural: single for single, plural in SINGULAR.items()}
 #: Keys that say which of several tables one is.
 KINDS = ("model", "shape", "kind")
@@ -33,7 +33,12 @@ def references(entry):
 def kind(name):
     """What a table says it is, such as ``model = "ogden"``; empty if it need not."""
     keys = TABLES[name]["properties"]
-    return next((f'{key} = "{keys[key]["const"]}"' for key in KINDS if "const" in keys.get(key, {})), "")
+    return next((f'{key} = "{keys[key]["enum"][0]}"' for key in KINDS if single(keys.get(key, {}))), "")
+
+
+def single(entry):
+    """Whether a key may have one value only."""
+    return len(entry.get("enum", ())) == 1
 
 
 def anchor(name):
@@ -45,8 +50,6 @@ def allowed(entry):
     """What a key may have, in words."""
     if "enum" in entry:
         return ", ".join(f"`{json.dumps(value)}`" for value in entry["enum"])
-    if "const" in entry:
-        return f"`{json.dumps(entry['const'])}`"
     units = [Units().of(kind) for kind in dict.fromkeys(kinds_in(entry)) if kind != "one"]
     names = alternatives(entry)
     for key, other in SCHEMA["properties"].items():
@@ -86,7 +89,7 @@ def rows(name, keys=None, without=()):
     needed = table.get("required", ())
     for key, entry in sorted(table.get("properties", {}).items(), key=lambda item: item[0] not in needed):
         short = any(key == single and plural in table["properties"] for plural, single in SHORT.items())
-        if short or (key in KINDS and "const" in entry) or key in without or (keys is not None and key not in keys):
+        if short or (key in KINDS and single(entry)) or key in without or (keys is not None and key not in keys):
             continue
         facts = "; ".join(filter(None, [allowed(entry), default(entry, key in needed)]))
         yield f"- `{key}`: {text(entry)}{f' ({facts})' if facts else ''}"

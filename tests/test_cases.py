@@ -406,6 +406,7 @@ WRONG = {
     "[insertion]": ('[cracks.glue]\nfacets = "crak"\nplus = true\n[insertion]', "'crak': .*; did you mean 'crack'"),
     "[steps]": ("[crack]\nfacets = 'crack'\nplus = 'right'\n[steps]", "cracks: not allowed beside .insertion."),
     '"0.002 MPa s"': ("0\nplane = 'strss'", "body.plane: 'strss': must be 'strain' or 'stress'; did you mean 'stress'"),
+    "speed =": ("friction = 0.1\nspeed =", "insertion.friction: unknown key, .*; it is a key of .tool."),
     "[law]": ("[tools.tool]\n[law]", "tool: given twice, as tools.tool and as tool"),
 }
 
@@ -495,7 +496,7 @@ def test_the_line_of_each_key(written):
 
 def test_schema_fits_what_is_read(written):
     """By the rules of JSON schemas, and for all built-in cases that are whole files."""
-    validator = jsonschema.Draft202012Validator(case_schema())
+    validator = jsonschema.Draft4Validator(case_schema())
     validator.check_schema(case_schema())
     texts = [path.read_text(encoding="utf-8") for _, path in built_in_cases().values()]
     texts = [BLADE, PEELED, *(text for text in texts if "\nextends" not in text)]
@@ -508,7 +509,7 @@ def test_schema_fits_what_is_read(written):
 
 def test_each_number_with_a_unit_has_its_kind():
     """What a description gives a unit in brackets is checked by dimension, also in classes that are added later."""
-    tables = {name: table.get("properties", {}) for name, table in case_schema()["$defs"].items()}
+    tables = {name: table.get("properties", {}) for name, table in case_schema()["definitions"].items()}
     keys = [(name, key, entry) for name, table in tables.items() for key, entry in table.items()]
     pattern = re.compile(r"\[(1/)?(stress|length|time|force|temperature|energy|power|mass|rad)\b")
     numbers = [(name, key, entry) for name, key, entry in keys if pattern.search(entry.get("description", ""))]

@@ -163,12 +163,16 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _paths(value: Any, keys: Keys = ()) -> Iterator[Keys]:
-    """Keys of a value and of all values in it."""
-    yield keys
+def places(value: Any, keys: Keys = ()) -> Iterator[tuple[Keys, Any]]:
+    """A value and all values in it, with their keys."""
+    yield keys, value
     entries = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
     for key, entry in entries:
-        yield from _paths(entry, (*keys, key))
+        yield from places(entry, (*keys, key))
+
+
+def _paths(value: Any) -> Iterator[Keys]:
+    return (keys for keys, _ in places(value))
 
 
 def _merged(first: Any, second: Any) -> Any:

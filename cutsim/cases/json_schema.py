@@ -10,6 +10,8 @@ from cutsim.cases.keys import SINGULAR
 from cutsim.cases.schema import CaseTables
 
 _NULL = {"type": "null"}
+#: What newer drafts call otherwise.
+_DRAFT_4 = {"$defs": "definitions", "prefixItems": "items"}
 
 
 class _Generator(GenerateJsonSchema):
@@ -22,27 +24,31 @@ class _Generator(GenerateJsonSchema):
 
 
 def case_schema() -> dict[str, Any]:
-    """JSON schema of case files, with the meaning of each key and its unit."""
-    raw = CaseTables.model_json_schema(schema_generator=_Generator)
-    schema: dict[str, Any] = _without_null(raw)
-    for table in (schema, *schema["$defs"].values()):
+    """JSON schema (draft 4) of case files, with the meaning of each key and its unit."""
+    raw = CaseTables.model_json_schema(schema_generator=_Generator, ref_template="#/definitions/{model}")
+    schema: dict[str, Any] = _in_draft_4(raw)
+    for table in (schema, *schema["definitions"].values()):
         for entry in table.get("properties", {}).values():
             _describe(entry)
-    for table in (schema, schema["$defs"]["Heat"]):
+    for table in (schema, schema["definitions"]["Heat"]):
         _add_short_forms(table["properties"])
-    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "Case file of cutsim"}
+    head = {"$schema": "http://json-schema.org/draft-04/schema#", "title": "Case file of cutsim"}
     # a file that extends another one need not give all tables
-    whole = {"if": {"not": {"required": ["extends"]}}, "then": {"required": schema["required"]}}
+    whole = {"anyOf": [{"required": ["extends"]}, {"required": schema["required"]}]}
     return head | {key: value for key, value in schema.items() if key not in ("title", "required")} | whole
 
 
-def _without_null(entry: Any) -> Any:
-    """A schema without null, which TOML does not have."""
+def _in_draft_4(entry: Any) -> Any:
+    """A schema in the words that editors of TOML know, without null, which TOML does not have."""
     if isinstance(entry, list):
-        return [_without_null(part) for part in entry if part != _NULL]
+        return [_in_draft_4(part) for part in entry if part != _NULL]
     if not isinstance(entry, Mapping):
         return entry
-    parts = {key: _without_null(part) for key, part in entry.items() if key != "default" or part is not None}
+    parts = {
+        _DRAFT_4.get(key, key): _in_draft_4(part) for key, part in entry.items() if key != "default" or part is not None
+    }
+    if isinstance(entry.get("const"), str):
+        parts["enum"] = [parts.pop("const")]
     if len(parts.get("anyOf", ())) == 1:
         (only,) = parts.pop("anyOf")
         parts = {**only, **parts}

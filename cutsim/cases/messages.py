@@ -8,7 +8,7 @@ from pydantic_core import ErrorDetails
 
 from cutsim.base.checks import Refused
 from cutsim.cases.docstrings import arguments_of
-from cutsim.cases.document import Document
+from cutsim.cases.document import Document, places
 from cutsim.cases.keys import Keys, nearest
 from cutsim.cases.scope import Scope
 
@@ -44,7 +44,7 @@ def _line(details: ErrorDetails, document: Document, scope: Scope) -> str:
     if isinstance(cause, Refused):
         return refusal(cause, keys, node, document)
     if details["type"] in ("missing", "extra_forbidden"):
-        return document.problem(keys, _about_key(keys, document.tables, scope))
+        return document.problem(keys, _about_key(keys, document, scope))
     return document.problem(keys, _about(details), details["input"])
 
 
@@ -77,9 +77,9 @@ def refusal(refused: Refused, keys: Keys, node: Any, document: Document) -> str:
     return document.problem(keys, f"{name} = {value!r} must be {refused.allowed}")
 
 
-def _about_key(keys: Keys, tables: Any, scope: Scope) -> str:
+def _about_key(keys: Keys, document: Document, scope: Scope) -> str:
     """A key that is unknown, or missing."""
-    parent: Any = tables
+    parent: Any = document.tables
     for key in keys[:-1]:
         parent = parent[key]
     table, name = scope.known.get(id(parent)), str(keys[-1])
@@ -88,7 +88,18 @@ def _about_key(keys: Keys, tables: Any, scope: Scope) -> str:
     if name in table.model_fields:
         described = arguments_of(table).get(name) or table.model_fields[name].description or ""
         return f"missing, must be given{': ' * bool(described)}{described}"
-    return f"unknown key, must be one of {', '.join(table.model_fields)}{nearest(name, table.model_fields)}"
+    hint = _owner(name, document, scope) or nearest(name, table.model_fields)
+    return f"unknown key, must be one of {', '.join(table.model_fields)}{hint}"
+
+
+def _owner(name: str, document: Document, scope: Scope) -> str:
+    """The table of the file that may have a key, in words; empty if none or several may."""
+    having = [
+        document.origin(keys)[1]
+        for keys, node in places(document.tables)
+        if id(node) in scope.known and name in scope.known[id(node)].model_fields
+    ]
+    return f"; it is a key of [{having[0]}]" if len(having) == 1 and having[0] else ""
 
 
 def _about(details: ErrorDetails) -> str:
