@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 import cutsim
 from cutsim.analysis.stepping import StepError
 from cutsim.cases import built_in
+from cutsim.cases.importing.draft import Imported
 from cutsim.commands import launch, new
 from cutsim.commands.endings import Ending, endings
 from cutsim.commands.jobs import Job, Runner
@@ -176,6 +177,19 @@ def test_answers_keep_the_comments_of_the_file(library, monkeypatch):
     assert list(defaults.values()) == ["A cut", "0.8"]
     mine = Path("mine.toml").read_text()
     assert 'title = "Mine"\n' in mine and 'toughness = "1.5 N/mm"  # energy of new surface' in mine
+
+
+def test_an_imported_model_says_what_is_not_translated(tmp_path, monkeypatch):
+    imported = Imported(
+        "title = 'a model'\n", ("model.feb:3: <MeshAdaptor>: has no counterpart",), (), {"more.txt": ""}
+    )
+    monkeypatch.setattr("cutsim.cases.importing.model_files.import_model", lambda path, folder: imported)
+    path = tmp_path / "case.toml"
+    result = runner.invoke(app, ["import", "model.feb", "-o", str(path)])
+    assert result.exit_code == Ending.QUESTIONABLE
+    assert result.stdout.startswith("not translated: model.feb:3: <MeshAdaptor>")
+    assert path.read_text() == imported.case_text and (tmp_path / "more.txt").exists()
+    assert runner.invoke(app, ["import", "model.feb", "-o", str(path)]).exit_code == Ending.BAD_INPUT
 
 
 def test_variations():

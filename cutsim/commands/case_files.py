@@ -32,6 +32,17 @@ def case_path(case: str) -> Path:
     raise FileNotFoundError(f"{case} is neither a file nor a built-in case (cutsim cases lists those){words}")
 
 
+def free_path(path: Path, *, overwrite: bool) -> Path:
+    """A path that may be written.
+
+    Raises:
+        FileExistsError: There is such a file, which is not to be overwritten.
+    """
+    if path.exists() and not overwrite:
+        raise FileExistsError(f"{path} exists: name another file by -o, or have it replaced by --overwrite")
+    return path
+
+
 def settings(changes: Iterable[str], option: str = "--set") -> dict[str, str]:
     """Changes by key.
 

@@ -20,6 +20,7 @@ from cutsim.commands import (
     doctor,
     fit,
     fit_material,
+    import_model,
     launch,
     new,
     plot,
@@ -33,7 +34,7 @@ from cutsim.commands.options import show_messages, talking
 
 #: Heading of the help → commands: name → module with the function `command` and its `EXAMPLES`.
 COMMANDS: dict[str, dict[str, ModuleType]] = {
-    "Begin": {"cases": cases, "new": new, "check": check},
+    "Begin": {"cases": cases, "new": new, "import": import_model, "check": check},
     "Simulate": {"run": run, "resume": resume, "sweep": sweep},
     "Look at results": {"plot": plot, "compare": compare, "report": report, "animate": animate},
     "Find parameters": {"fit": fit, "fit-material": fit_material},

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cutsim.commands.case_files import case_path, complete
+from cutsim.commands.case_files import case_path, complete, free_path
 from cutsim.commands.options import Overwrite, console
 
 if TYPE_CHECKING:
@@ -34,9 +34,7 @@ def command(
     Each line that you would change has a comment that says what it is.
     """
     file = case_path(source or _choice())
-    path = output or Path(file.name)
-    if path.exists() and not overwrite:
-        raise FileExistsError(f"{path} exists: name another file by -o, or have it replaced by --overwrite")
+    path = free_path(output or Path(file.name), overwrite=overwrite)
     text = file.read_text(encoding="utf-8")
     path.write_text(text if source else _answered(file, text), encoding="utf-8")
     console().print(f"written: {path}", f"next: cutsim check {path}, then cutsim run {path}", sep="\n", markup=False)
