@@ -106,8 +106,7 @@ class Mechanics(Balance[Term, Support]):
         if analysis == "dynamic":
             self.motion = Dynamic(Inertia(state, offering(terms, Body), scheme, mass), terms, supports)
         interfaces, size = offering(terms, Interface), extent(state.mesh.comm, state.mesh.geometry.x)
-        check_disjoint(state.mesh, offering(terms, Body))
-        check_cracks(state, offering(terms, Bonded))
+        _check_places(state, terms)
         super().__init__(
             "mechanics",
             state,
@@ -260,6 +259,12 @@ class Mechanics(Balance[Term, Support]):
         for observer in self._observers:
             columns |= observer.record()
         return columns | self.trial_audit.record()
+
+
+def _check_places(state: State, terms: Sequence[Term]) -> None:
+    """Refuse solids that share cells and cracks that share facets, and doubt gaps in these. Collective."""
+    check_disjoint(state.mesh, offering(terms, Body))
+    check_cracks(state, offering(terms, Bonded))
 
 
 def _interface_nodes(state: State, interfaces: Sequence[Interface]) -> NDArray[np.int32]:
