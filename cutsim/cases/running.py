@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,6 +105,8 @@ def run_case(
             simulation.problem.check()
     elif time >= simulation.until:  # the run has come to its end
         return _outcome(simulation, folder)
+    else:
+        begun -= comm.bcast(_seconds(folder))
     recording = _recording(simulation, folder, checkpoints, overwrite=overwrite, quiet=quiet)
     on_root(comm, lambda: replace_file(folder / CASE, case.text.encode()))
     if simulation.problem.state.number == 0:
@@ -116,6 +119,14 @@ def run_case(
     except OSError as full:
         error = error or full
     return _outcome(simulation, folder, error)
+
+
+def _seconds(folder: Path) -> float:
+    """Time that earlier parts of a run have taken, as far as a summary says it [s]."""
+    try:
+        return float(json.loads((folder / "summary.json").read_text(encoding="utf-8"))["wall_time"])
+    except (OSError, ValueError, KeyError):  # it was killed before it wrote one
+        return 0.0
 
 
 def _present(folder: Path, *, animation: bool) -> None:
