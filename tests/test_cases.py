@@ -411,6 +411,12 @@ WRONG = {
 }
 
 
+@pytest.mark.parametrize("text", ["a = " + "[" * 5000, "a = " + "[" * 40 + "]" * 40, "a." * 2000 + "b = 1"])
+def test_what_lies_too_deep_is_refused(written, text):
+    (problem,) = refused(written(text))
+    assert problem.startswith("case.toml:1: ")
+
+
 @pytest.mark.parametrize("right", WRONG)
 def test_what_is_wrong_is_named_with_what_is_allowed(written, right):
     wrong, words = WRONG[right]

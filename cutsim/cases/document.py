@@ -1,8 +1,9 @@
 """Text of a case file: its tables, what it extends, changes from the command line, and where each value was written."""
 
 import re
+import sys
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +14,9 @@ from cutsim.cases.keys import SINGULAR, Keys, dotted, full
 
 #: Keys that say what a table describes: with another value it is another table, not a change of the first.
 _KINDS = ("model", "library", "shape", "kind", "geometry", "file", "fixed")
+#: How deep tables and lists may lie in each other.
+_DEEPEST = 30
+_LINE = re.compile(r"(?!--set )(.+?):(\d+): ")
 _PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
 
 
@@ -26,6 +30,12 @@ class CaseError(ValueError):
     def __init__(self, problems: list[str]) -> None:
         super().__init__("\n".join(problems))
         self.problems = problems
+
+
+def by_line(problem: str) -> tuple[str, int]:
+    """File and line of a problem, to sort by; those of the command line come last."""
+    place = _LINE.match(problem)
+    return (place[1], int(place[2])) if place else (chr(sys.maxunicode), 0)
 
 
 @dataclass(frozen=True)
@@ -166,9 +176,20 @@ def _short(value: Any) -> str:
 def places(value: Any, keys: Keys = ()) -> Iterator[tuple[Keys, Any]]:
     """A value and all values in it, with their keys."""
     yield keys, value
-    entries = value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
-    for key, entry in entries:
+    for key, entry in _entries(value):
         yield from places(entry, (*keys, key))
+
+
+def _entries(value: Any) -> Iterable[tuple[str | int, Any]]:
+    return value.items() if isinstance(value, Mapping) else enumerate(value) if isinstance(value, list) else ()
+
+
+def _too_deep(tables: Any) -> bool:
+    """Whether tables and lists lie deeper in each other than any case needs, and than programs follow."""
+    level = [tables]
+    for _ in range(_DEEPEST):
+        level = [entry for value in level for _, entry in _entries(value)]
+    return bool(level)
 
 
 def _paths(value: Any) -> Iterator[Keys]:
@@ -244,6 +265,8 @@ def load(path: Path, within: tuple[Path, ...] = ()) -> Document:
         tables = tomllib.loads(file.text)
     except (ValueError, RecursionError) as error:
         raise CaseError([_syntax(file, error)]) from None
+    if _too_deep(tables):
+        raise CaseError([f"{file.path}:1: must have tables and lists in each other no deeper than {_DEEPEST}"])
     document = unfolded(tables, file)
     base = tables.get("extends")
     if not isinstance(base, str):

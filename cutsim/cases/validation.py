@@ -8,7 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 from cutsim.base.units import Units
 from cutsim.cases.constructed import FromTable
 from cutsim.cases.contradictions import contradictions
-from cutsim.cases.document import CaseError, Document
+from cutsim.cases.document import CaseError, Document, by_line
 from cutsim.cases.messages import problems
 from cutsim.cases.quantities import consistent
 from cutsim.cases.schema import CaseTables
@@ -30,10 +30,10 @@ def validated(kind: type[Tables], document: Document, groups: Collection[str] | 
         CaseError: With one line for each thing that is wrong.
     """
     tables, found = _validated(kind, document, groups)
-    if "quick" in document.tables:
+    if "quick" in document.tables and groups is None:  # its mesh may be another one
         found += _validated(kind, document.hurried(), groups)[1]
     if found or tables is None:
-        raise CaseError(list(dict.fromkeys(found)))
+        raise CaseError(sorted(dict.fromkeys(found), key=by_line))
     return tables
 
 
