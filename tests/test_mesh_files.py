@@ -69,6 +69,10 @@ def test_elements_have_their_shape_and_groups(tmp_path, kind, shape, bend):
     straight, both = boxes(shape)
     points = boxes(shape, bend=bend)[0]
     domain = read_mesh(file_of(tmp_path, kind, points, both, straight), COMM, dimension(shape))
+    # of 27 and 9 nodes for those of 20 and 8
+    counts = {"hex20": 45, "hex27": 45, "vtk27": 45, "quad8": 15, "quad9": 15}
+    nodes = domain.mesh.geometry.index_map().size_global
+    assert nodes == counts.get(shape, len(points))
     first, second = ("part 7", "part 8") if kind in MESHIO else ("A", "B")
     parts = [volume(domain.mesh, domain.cells(name)) for name in (first, second)]
     assert sum(parts) == pytest.approx(bent_volume(dimension(shape), bend), rel=1e-12)
@@ -234,6 +238,21 @@ def test_groups_of_one_type_can_be_read_of_a_file_with_several(tmp_path, caplog)
     for wrong, words in ((["tools"], "only = 'tools' .* A, tool"), ([], "only = "), ("tool", "only = 'tool'")):
         with pytest.raises(ValueError, match=words):
             read_mesh(path, COMM, only=wrong)
+
+
+def test_cells_that_do_not_fit_are_refused(tmp_path):
+    """Cells of second order with another node on a common edge, and a node in two places."""
+    points, (first, second) = boxes("tet10")
+    edge = next(node for node in np.intersect1d(first[:, 4:], second[:, 4:]))
+    other = np.where(second == edge, len(points), second)
+    text = abaqus("C3D10", np.vstack([points, points[edge]]), (first, other))
+    with pytest.raises(ValueError, match="edges or faces have other nodes in other cells, the first at"):
+        read_mesh(write(tmp_path, "edge.inp", text), COMM)
+    assert "A|B" in read_mesh(COMM.bcast(tmp_path / "edge.inp"), COMM, merge=True).names
+    lost = np.setdiff1d(second[:, 4:], first)[0]
+    text = abaqus("C3D10", points, (first, np.where(second == lost, first[0, 0], second)))
+    with pytest.raises(ValueError, match="is a corner of one cell and lies on an edge"):
+        read_mesh(write(tmp_path, "corner.inp", text), COMM)
 
 
 WRONG_ABAQUS = {

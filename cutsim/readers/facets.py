@@ -89,6 +89,40 @@ def check_corners(corners: Indices, points: Floats) -> None:
         raise ValueError(f"{len(bad)} cells have a node twice, the first at {first}")
 
 
+def check_nodes(cell: str, degree: int, cells: Indices, points: Floats) -> None:
+    """Refuse cells of higher order that do not have the nodes on their common edges and faces in common.
+
+    Args:
+        cell: Type of the cells as dolfinx calls it.
+        degree: Degree of their shape.
+        cells: Their nodes, shape (cells, nodes).
+        points: Positions of the nodes.
+
+    Raises:
+        ValueError: An edge or face has other nodes in another cell, or a node belongs to two of them.
+    """
+    element = basix.create_element(
+        basix.ElementFamily.P, getattr(basix.CellType, cell), degree, basix.LagrangeVariant.equispaced
+    )
+    topology = basix.topology(element.cell_type)
+    random = np.random.default_rng(1).integers(0, 2**62, cells.max(initial=0) + 1, dtype=np.uint64)
+    count = 0
+    for corners, inner in zip(topology, element.entity_dofs, strict=True):
+        if not inner[0]:
+            continue
+        # the same if the sums of random numbers of their nodes are
+        keys, values = (random[cells[:, np.array(part)]].sum(axis=2).ravel() for part in (corners, inner))
+        _, first, which = np.unique(keys, return_index=True, return_inverse=True)
+        bad = np.flatnonzero(values != values[first][which.ravel()])
+        if len(bad):
+            number, local = divmod(int(bad[0]), len(inner))
+            where = place(points[cells[number, corners[local]]].mean(axis=0))
+            raise ValueError(f"{len(bad)} edges or faces have other nodes in other cells, the first at {where}")
+        count += len(first) * len(inner[0])
+    if count != len(np.unique(cells)):
+        raise ValueError("a node of the mesh is a corner of one cell and lies on an edge or face of another one")
+
+
 def check_neighbours(table: FacetTable, points: Floats) -> None:
     """Refuse what is no mesh: facets of more than two cells, and cells that have more than one facet in common.
 

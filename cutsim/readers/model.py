@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import place
 from cutsim.readers import shapes
-from cutsim.readers.facets import FacetTable, check_corners, check_members, check_neighbours, facets_among
+from cutsim.readers.facets import FacetTable, check_corners, check_members, check_neighbours, check_nodes, facets_among
 from cutsim.readers.mesh_data import Floats, Indices, MeshData
 from cutsim.readers.selection import Selection
 from cutsim.readers.twins import Merge, interfaces, same_nodes
@@ -83,6 +83,7 @@ def make_model(data: MeshData, choice: Choice) -> Model:
     number[used] = np.arange(len(used))
     table = FacetTable(cell, shapes.corners(shape, cells))
     check_neighbours(table, points[used])
+    check_nodes(cell, degree, cells, points[used])
     sets = _Sets(data, selection, points, number[roots], table)
     facets = sets.facets()
     between = interfaces(selection.parts, table, FacetTable(cell, corners), twins[used])

@@ -81,14 +81,19 @@ def completed(shape: str, nodes: Indices, points: Floats) -> tuple[str, Indices,
         return shape, nodes, points
     full, faces = _INCOMPLETE[shape]
     first = nodes.shape[1] - len(_EDGES[shape])
-    for face in faces:
-        mids = [first + i for i, ends in enumerate(_EDGES[shape]) if set(ends) <= set(face)]
-        share = len(face) / 4
-        places = (1 + share) * points[nodes[:, mids]].mean(axis=1) - share * points[nodes[:, face]].mean(axis=1)
+    for size in sorted({len(face) for face in faces}):
+        keys, places = [], []
+        for face in (face for face in faces if len(face) == size):
+            mids = [first + i for i, ends in enumerate(_EDGES[shape]) if set(ends) <= set(face)]
+            share = size / 4
+            keys.append(np.sort(nodes[:, face], axis=1))
+            places.append(
+                (1 + share) * points[nodes[:, mids]].mean(axis=1) - share * points[nodes[:, face]].mean(axis=1)
+            )
         # neighbours have the node of their face in common
-        _, one, which = np.unique(np.sort(nodes[:, face], axis=1), axis=0, return_index=True, return_inverse=True)
-        nodes = np.column_stack([nodes, len(points) + which.ravel()])
-        points = np.concatenate([points, places[one]])
+        _, one, which = np.unique(np.concatenate(keys), axis=0, return_index=True, return_inverse=True)
+        nodes = np.column_stack([nodes, len(points) + which.reshape(len(keys), -1).T])
+        points = np.concatenate([points, np.concatenate(places)[one]])
     return full, nodes, points
 
 
