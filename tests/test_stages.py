@@ -9,6 +9,8 @@ from cutsim.analysis.stepping import StepControl, StepError, run
 from cutsim.fields.points import Surface
 from cutsim.interface.contact import PenaltyContact
 from cutsim.results.animation import animate, draw_stages
+from cutsim.results.pictures import polydata
+from cutsim.results.scene import sharp_edges
 from cutsim.results.stage_recorder import Stages
 from cutsim.results.stages import Skin, Stage, read_stages, spread
 from cutsim.results.tool_surfaces import ToolSurfaces, _pointed
@@ -126,6 +128,12 @@ def test_image_of_a_part_has_no_seam():
     inside = skin([(0, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 0)], [(0, 1, 2), (0, 1, 3)], part=[1, 2]).mirrored("x")
     assert inside.values["part"].tolist() == [2, 2]  # a triangle in the plane is within the whole
     assert len(Skin.joined([part, whole]).cells) == 6 and not len(Skin.joined([]).cells)
+
+
+def test_edges_are_those_of_the_body_and_not_of_its_cells():
+    """Also where the triangles of a plane body are turned either way."""
+    square = skin([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2), (0, 3, 2)])
+    assert sharp_edges(polydata(square)).n_cells == 4
 
 
 def test_stages_are_drawn_and_animated(tmp_path):

@@ -125,8 +125,8 @@ def _tiles(run: RunFiles) -> Iterator[tuple[str, str]]:
         yield f"largest {y.words}", _quantity(y.values[peak], y.unit)
         yield f"at {x.words}", _quantity(x.values[peak], x.unit)
         yield f"last {y.words}", _quantity(y.values[-1], y.unit)
-    if run.steps and "energy_closure" in history:
-        yield "energy missing, at most", f"{100 * np.abs(history['energy_closure'].values).max():.2g} %"
+    if run.missed_energy is not None:
+        yield "energy missing", f"{100 * run.missed_energy:.2g} %"
     if run.steps:
         yield "steps", str(run.steps)
     if isinstance(wall := run.summary.get("wall_time"), int | float):

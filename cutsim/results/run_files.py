@@ -12,10 +12,13 @@ from typing import Any, Self
 import numpy as np
 
 from cutsim.base.arrays import Array
+from cutsim.base.terms import ENTRIES
 
 # abscissae and ordinates of the main curve, the first that there are
 _ABSCISSAE = ("depth", "way", "opening", "deflection", "time")
 _ORDINATES = ("force", "load")
+# columns of the energy audit that it adds up
+_AUDIT = tuple(f"energy_{entry}" for entry in ENTRIES)
 # how a reason against a run begins that has not come to its end
 _INTERRUPTED = "interrupted at time"
 # part of the time of a run by which it may miss its end
@@ -128,7 +131,7 @@ class RunFiles:
             return Judgement("interrupted" if interrupted else "failed", f"{self._end}.", reasons)
         if self.summary["verdict"] == "trusted":
             return Judgement("trusted", "The run is complete, and nothing speaks against its result.")
-        count = "One reason speaks" if len(reasons) == 1 else f"{len(reasons)} reasons speak"
+        count = "one reason speaks" if len(reasons) == 1 else f"{len(reasons)} reasons speak"
         return Judgement("questionable", f"The run is complete, but {count} against its result.", reasons)
 
     @property
@@ -156,6 +159,16 @@ class RunFiles:
         forces = [name for name in self.history if name.endswith(("_force", "_reaction")) or "_force_" in name]
         y = next((name for name in (given[1], *_ORDINATES, *forces) if name in self.history), None)
         return (x, y) if x and y else None
+
+    @property
+    def missed_energy(self) -> float | None:
+        """What the energy audit missed at the worst, over the largest turnover of the run [–]; None without one."""
+        entries = [column.values for name, column in self.history.items() if name in _AUDIT]
+        if not entries or not self.steps or not {"work_external", "energy_closure"} <= set(self.history):
+            return None
+        closure, work = (self.history[name].values for name in ("energy_closure", "work_external"))
+        turnover = np.maximum.accumulate(np.maximum(np.abs(work), np.abs(entries).sum(axis=0)))
+        return float(np.abs(closure * turnover).max() / turnover[-1]) if turnover[-1] else 0.0
 
     def case_rows(self) -> Iterator[tuple[str, list[tuple[str, str]]]]:
         """Tables of the case by their names, each with its keys and values, those without a table first."""
@@ -190,7 +203,10 @@ def _or_else(otherwise: Any, read: Any, path: Path, missing: list[str]) -> Any:
 
 def _tables(name: str, table: Mapping[str, Any]) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     inner = {key: value for key, value in table.items() if isinstance(value, Mapping)}
-    rows = [(key, _shown(value)) for key, value in table.items() if key not in inner]
+    for key, value in table.items():
+        if isinstance(value, list) and value and all(isinstance(entry, Mapping) for entry in value):
+            inner |= {f"{key} {number}": entry for number, entry in enumerate(value, start=1)}
+    rows = [(key, _shown(value)) for key, value in table.items() if key not in inner and f"{key} 1" not in inner]
     if rows:
         yield name, rows
     for key, value in inner.items():

@@ -172,7 +172,8 @@ def sharp_edges(surface: pyvista.PolyData, seams: Sequence[str] = ()) -> pyvista
         seams: The planes, by the axes normal to them.
     """
     # the cells of a plane surface may be turned either way, which is no edge
-    edges = surface.extract_feature_edges(_SHARP, feature_edges=bool(np.ptp(surface.points[:, 2])))
+    sharp = bool(np.ptp(surface.points[:, 2]))
+    edges = surface.extract_feature_edges(_SHARP, feature_edges=sharp, manifold_edges=False)
     if not seams or not edges.n_cells:
         return edges
     seam = [np.isclose(edges.cell_centers().points[:, "xyz".index(plane)], 0.0) for plane in seams]

@@ -15,12 +15,12 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-#: Part of the height that is left to the scene; below it are bars and scale.
-SCENE = 0.87
+#: Part of the height that is left to the scene; above it is the title, below it are bars and scale.
+SCENE = 0.81
 #: Size of a picture [inch].
 SIZE = (8.0, 5.0)
 
-_TITLE = 0.94
+_BOTTOM, _TITLE = 0.13, 0.955
 # where the bars are: left end and width
 _PLACES = ((0.06, 0.34), (0.47, 0.26))
 # entries of a legend below each other
@@ -90,7 +90,7 @@ def compose(
         The figure; it is white unless matplotlib's ``savefig.transparent`` says otherwise.
     """
     figure = Figure(figsize=SIZE, dpi=pixels.shape[1] / SIZE[0])
-    scene = figure.add_axes((0.0, 1.0 - SCENE, 1.0, SCENE))
+    scene = figure.add_axes((0.0, _BOTTOM, 1.0, SCENE))
     scene.imshow(pixels, aspect="auto", interpolation="none" if pixels.shape[1] >= 1600 else "antialiased")
     scene.axis("off")
     if title:
