@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
+from cutsim.interface.cohesive import Bilinear
 from cutsim.materials.anisotropic import FungOrthotropic
 from cutsim.materials.elastic import IsochoricNeoHookean, Material, NeoHookean, StVenantKirchhoff
 from cutsim.materials.fibres import Reinforced
@@ -15,6 +16,8 @@ from cutsim.materials.viscoelastic import Prony
 UNCOUPLED = (ArrudaBoyce, FungOrthotropic, IsochoricNeoHookean, IsochoricOgden, MooneyRivlin, Yeoh)
 #: Constants of which the energy of a distortion is a multiple.
 _MODULI = ("c1", "c2", "c3", "modulus", "moduli")
+#: Strength of what is tied, in Young's modulus; no rubber-like body reaches it.
+_STRONG = 50.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,23 @@ def distortion_scaled(material: Material, factor: float) -> Material:
         if (value := getattr(material, name, None)) is not None
     }
     return replace(material, **scaled)  # type: ignore[arg-type]
+
+
+def tie(penalty: float, young: float) -> dict[str, Any]:
+    """How a case file says a bond that does not break.
+
+    Args:
+        penalty: Its stiffness [stress/length].
+        young: Young's modulus of what it joins [stress].
+    """
+    strength = rounded(_STRONG * young)
+    toughness = rounded(10 * strength**2 / penalty)
+    return table(Bilinear(rounded(penalty), strength, toughness, strength, toughness))
+
+
+def rounded(number: float) -> float:
+    """A number that need not be exact, with four digits."""
+    return float(f"{number:.4g}")
 
 
 def table(thing: Any) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cutsim.cases.importing.counterparts import rounded, tie
 from cutsim.cases.importing.draft import MalformedFile, Untranslatable
 from cutsim.cases.importing.febio_context import Context, describe
 from cutsim.cases.importing.febio_file import children
@@ -41,8 +42,6 @@ _NEUTRAL: Mapping[str, tuple[str, ...]] = MappingProxyType(
 _PENETRATION = 0.01
 #: Stiffness of what is tied without a tolerance, in Young's modulus over the height of an element.
 _STIFF = 100.0
-#: Strength of what is tied, in Young's modulus; no rubber-like body reaches it.
-_STRONG = 50.0
 
 
 def translate_contacts(context: Context, bodies: Mapping[str, RigidBody], young: Mapping[str, float]) -> None:
@@ -138,10 +137,10 @@ def _sliding(context: Context, element: LinedElement, surface: str, young: Mappi
     two_pass = _on(context, element, "two_pass")
     # both passes of FEBio carry the whole penalty, ours share it
     penalty = _penalty(context, element, surface, young) * (2 if two_pass else 1)
-    values: dict[str, Any] = {"contact": {"stiffness": _rounded(penalty)}}
+    values: dict[str, Any] = {"contact": {"stiffness": rounded(penalty)}}
     gap = file.number(element, "gaptol", 0.0)
     if _on(context, element, "laugon"):
-        values["allowed_penetration"] = gap or _rounded(_PENETRATION * mean_size(context.mesh, surface))
+        values["allowed_penetration"] = gap or rounded(_PENETRATION * mean_size(context.mesh, surface))
     friction, stiffness = file.number(element, "fric_coeff", 0.0), file.number(element, "fric_penalty", 0.0)
     if friction:
         law = {"model": "coulomb", "mu": friction, "stiffness": stiffness}
@@ -161,10 +160,6 @@ def _reference(context: Context, surface: str, young: Mapping[str, float]) -> fl
     return max(young.values(), default=1.0) / height
 
 
-def _rounded(number: float) -> float:
-    return float(f"{number:.4g}")
-
-
 def _pair(context: Context, element: LinedElement, surfaces: tuple[str, str], young: Mapping[str, float]) -> None:
     values = {"slave": surfaces[0], "master": surfaces[1], **_sliding(context, element, surfaces[0], young)}
     context.draft.add("pairs", element.get("name") or "contact", values, f"line {element.line}")
@@ -176,11 +171,8 @@ def _tie(context: Context, element: LinedElement, surfaces: tuple[str, str], you
     penalty = _penalty(context, element, surfaces[0], young)
     for tag in ("two_pass", "gaptol"):
         context.file.child(element, tag)
-    penalty = _rounded(_STIFF * _reference(context, surfaces[0], young) if augmented else penalty)
-    strength = _rounded(_STRONG * max(young.values(), default=1.0))
-    toughness = _rounded(10 * strength**2 / penalty)
-    law = {"model": "bilinear", "penalty": penalty, "strength": strength, "toughness": toughness}
-    law |= {"shear_strength": strength, "shear_toughness": toughness}
+    penalty = _STIFF * _reference(context, surfaces[0], young) if augmented else penalty
+    law = tie(penalty, max(young.values(), default=1.0))
     values = {"slave": surfaces[0], "master": surfaces[1], "law": law, "small_sliding": True}
     context.draft.add("pairs", element.get("name") or "tied", values, f"line {element.line}")
     if augmented:

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 from cutsim.base.checks import require
+from cutsim.cases.importing.abaqus import import_abaqus
 from cutsim.cases.importing.draft import Imported
 from cutsim.cases.importing.febio import import_febio
 
@@ -22,7 +23,7 @@ def import_model(path: Path | str, folder: Path | str | None = None) -> Imported
         OSError: It cannot be read.
     """
     path = Path(path)
-    readers = {".feb": import_febio}
+    readers = {".feb": import_febio, ".inp": import_abaqus}
     require("path", str(path), path.suffix.lower() in readers, "a file of FEBio (.feb) or Abaqus (.inp)")
     mesh_file = path.name if folder is None else os.path.relpath(path, folder)
     return readers[path.suffix.lower()](path, mesh_file)

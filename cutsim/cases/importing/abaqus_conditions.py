@@ -1,0 +1,177 @@
+"""Prescribed displacements and loads of Abaqus."""
+
+from collections.abc import Iterator, Mapping
+from math import hypot
+from types import MappingProxyType
+from typing import Any
+
+from cutsim.cases.importing.abaqus_file import AbaqusFile, Located
+from cutsim.cases.importing.abaqus_history import Amplitudes, History, Step
+from cutsim.cases.importing.draft import Untranslatable
+from cutsim.readers.abaqus_cards import Card, real
+
+#: Directions that a named condition holds.
+_NAMED: Mapping[str, tuple[int, ...]] = MappingProxyType(
+    {"ENCASTRE": (1, 2, 3), "PINNED": (1, 2, 3), "XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,)}
+)
+_AXES = "xyz"
+_ROTATIONS = (4, 5, 6)
+
+
+class Conditions:
+    """Conditions of a file through its steps.
+
+    Args:
+        file: The file.
+        steps: Its steps, the first one a moment before them.
+        dim: Dimension of the mesh.
+    """
+
+    def __init__(self, file: AbaqusFile, steps: list[Step], dim: int) -> None:
+        self._file, self._steps, self._dim = file, steps, dim
+        self._amplitudes = Amplitudes(file)
+        self._supports: dict[tuple[str, str, int], History] = {}
+        self._loads: dict[tuple[Any, ...], History] = {}
+        self._comments: dict[tuple[Any, ...], str] = {}
+
+    def translate(self) -> None:
+        """Translate all of them."""
+        for located in self._file.take("BOUNDARY"):
+            with self._file.attempt(located.card):
+                self._boundary(located)
+        for located in self._file.take("CLOAD", "DLOAD", "DSLOAD"):
+            with self._file.attempt(located.card):
+                self._load(located)
+        self._write_supports()
+        self._write_loads()
+
+    # -- prescribed displacements ---------------------------------------------------------------------------------
+
+    def _boundary(self, located: Located) -> None:
+        card, step = located.card, self._steps[located.step]
+        if (card.get("TYPE").upper() or "DISPLACEMENT") != "DISPLACEMENT" or "FIXED" in card.parameters:
+            raise Untranslatable(f"with {', '.join(card.parameters)}", card.line)
+        released = card.get("OP").upper() == "NEW" and located.step > 1
+        amplitude, named = self._amplitudes.of(card, step), set()
+        for line, entries in card.rows():
+            with card.at(line):
+                key, where = self._nodes(entries[0], located.part, line)
+                for dof, value in _held(entries, line):
+                    if dof in range(1, self._dim + 1):
+                        named.add((key, where, dof))
+                        self._comments.setdefault((key, where, dof), f"line {line}")
+                        self._supports.setdefault((key, where, dof), History()).set(value, step, amplitude)
+        if released and self._supports.keys() - named:
+            raise Untranslatable("OP=NEW: what is held before is not released here", card.line)
+
+    def _nodes(self, entry: str, part: str, line: int) -> tuple[str, str]:
+        """Key and value of the case file for a node or a set of nodes; a node is given by its position."""
+        if entry.isdecimal():
+            found = (self._file.mesh.numbers == int(entry)).nonzero()[0]
+            if len(found) != 1:
+                raise ValueError(f"there is no node {entry}, or more than one")
+            return "points", repr(self._file.mesh.points[found[0]][: self._dim].tolist())
+        names = self._file.find(self._file.mesh.node_sets, entry, part)
+        if not names:
+            raise ValueError(f"there is no set of nodes {entry!r}")
+        if len(names) > 1:
+            raise Untranslatable(f"the set {entry!r} is one of {len(names)} instances", line)
+        quadratic = self._file.draft.tables.get("mesh", {}).get("degree", 1) > 1
+        return "facets" if quadratic else "vertices", names[0]
+
+    def _write_supports(self) -> None:
+        for (key, where, dof), history in self._supports.items():
+            value = history.timed()
+            amount = {} if value.vanishes else {"value": value.value(self._file.end)}
+            place = [_point(where)] if key == "points" else where
+            label = "node" if key == "points" else where
+            values = {key: place, "direction": _AXES[dof - 1], **amount}
+            self._file.draft.add("supports", f"{label}_{_AXES[dof - 1]}", values, self._comments[key, where, dof])
+
+    # -- loads ----------------------------------------------------------------------------------------------------
+
+    def _load(self, located: Located) -> None:
+        card, step = located.card, self._steps[located.step]
+        amplitude, named = self._amplitudes.of(card, step), set()
+        for line, entries in card.rows():
+            with card.at(line):
+                for key, value in self._of_row(card, located.part, line, entries):
+                    named.add(key)
+                    self._comments.setdefault(key, f"line {line}")
+                    self._loads.setdefault(key, History()).set(value, step, amplitude)
+        if card.get("OP").upper() == "NEW":
+            for key, history in self._loads.items():
+                if key[0] == card.keyword and key not in named:
+                    history.set(0.0, step)
+
+    def _of_row(self, card: Card, part: str, line: int, entries: list[str]) -> Iterator[tuple[tuple[Any, ...], float]]:
+        """What loads a row says: a key, and the value."""
+        if card.keyword == "CLOAD":
+            yield self._on_nodes(part, line, entries)
+        elif card.keyword == "DSLOAD":
+            yield self._on_surface(card, part, line, entries)
+        else:
+            raise Untranslatable(
+                f"{' '.join(entries[1:2])} on elements: give the faces as a *SURFACE with *DSLOAD", line
+            )
+
+    def _on_nodes(self, part: str, line: int, entries: list[str]) -> tuple[tuple[Any, ...], float]:
+        key, where = self._nodes(entries[0], part, line)
+        dof = int(real(entries[1]))
+        if key == "facets" or dof not in range(1, self._dim + 1):
+            raise Untranslatable(f"a force along {dof} on {entries[0]!r}", line)
+        return ("CLOAD", key, where, tuple(float(i == dof - 1) for i in range(self._dim))), real(entries[2])
+
+    def _on_surface(self, card: Card, part: str, line: int, entries: list[str]) -> tuple[tuple[Any, ...], float]:
+        names = self._file.find(self._file.mesh.facet_sets, entries[0], part)
+        if len(names) != 1:
+            raise ValueError(f"there is no surface {entries[0]!r} of elements")
+        kind, value = entries[1].upper(), real(entries[2])
+        if kind == "P":
+            return ("DSLOAD", "pressure", names[0], ()), value
+        if kind not in ("TRVEC", "TRSHR"):
+            raise Untranslatable(f"{kind} on {entries[0]!r}", line)
+        vector = [real(entry) for entry in entries[3 : 3 + self._dim]]
+        size = hypot(*vector)
+        if kind == "TRSHR" or not size:
+            raise Untranslatable(f"{kind} on {entries[0]!r}", line)
+        if self._file.large and card.get("FOLLOWER").upper() != "NO":
+            self._file.draft.difference(
+                line, f"*{card.keyword}: the direction of {kind} does not turn with the surface"
+            )
+        return ("DSLOAD", "traction", names[0], tuple(c / size for c in vector)), value
+
+    def _write_loads(self) -> None:
+        for key, history in self._loads.items():
+            value = {"value": history.timed().value(self._file.end)}
+            keyword, kind, where, direction = key
+            if keyword == "CLOAD":
+                place = [_point(where)] if kind == "points" else where
+                values = {"kind": "force", kind: place, "direction": list(direction), **value}
+            elif kind == "pressure":
+                values = {"kind": "pressure", "facets": where, **value}
+            else:
+                values = {"kind": "traction", "facets": where, "direction": list(direction), **value}
+                values |= {"current_area": True} if self._file.large else {}
+            label = "node" if kind == "points" else where
+            self._file.draft.add("loads", f"{label}_{values['kind']}", values, self._comments[key])
+
+
+def _held(entries: list[str], line: int) -> Iterator[tuple[int, float]]:
+    """Directions that a row of ``*BOUNDARY`` holds, and their displacement; rotations do nothing in a solid."""
+    word = entries[1].upper() if len(entries) > 1 else ""
+    if word in _NAMED:
+        yield from ((dof, 0.0) for dof in _NAMED[word])
+        return
+    if not word.isdecimal():
+        raise Untranslatable(f"condition {word!r}", line)
+    first = int(word)
+    last = int(real(entries[2])) if len(entries) > 2 and entries[2] else first
+    if last > max(_ROTATIONS):
+        raise Untranslatable(f"degree of freedom {last}", line)
+    value = real(entries[3]) if len(entries) > 3 else 0.0
+    yield from ((dof, value) for dof in range(first, last + 1))
+
+
+def _point(text: str) -> list[float]:
+    return [float(c) for c in text.strip("[]").split(",")]
