@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim.analysis.stepping import run
 from cutsim.cases import import_model, read_case
 
 MODEL = """*HEADING
@@ -83,8 +82,7 @@ def test_stretched_cube(tmp_path):
     result.write(tmp_path / "case.toml")
     simulation = read_case(tmp_path / "case.toml").build(MPI.COMM_SELF)
     rows = []
-    for until, control in simulation.schedule:
-        run(simulation.problem, until, control, rows.append)
+    simulation.run(rows.append)
     assert rows[-1].columns["top_z_force"][0] == pytest.approx(1.5 - 1.5**-2, rel=1e-4)
 
 
@@ -159,6 +157,19 @@ def test_values_through_steps(tmp_path):
     total = amplitude.replace("NAME=a", "NAME=a, TIME=TOTAL TIME").replace("1, 2, 2, 0", "1, 1, 3, 3")
     case = imported(tmp_path, steps=f"{PULL}\n{SECOND.format(', AMPLITUDE=A', 0.5)}", model=total)[0]
     assert [value(case, "top_z", t) for t in (1, 2, 3)] == pytest.approx([0.5, 1, 1.5])
+
+
+def test_weight(tmp_path):
+    """Gravity acts on bodies with their density; forces per volume along an axis."""
+    steps = PULL.replace("*OUTPUT", "*DLOAD\n, GRAV, 5, 0, 0, -2\ncube, BY, 3\n*OUTPUT")
+    case, result = imported(tmp_path, steps=steps)
+    assert result.untranslated == () and case["bodies"]["Cube"]["density"] == 2
+    assert case["loads"] == {
+        "weight": {"kind": "weight", "direction": [0, 0, -1], "value": "10*t"},
+        "Cube_body_force": {"kind": "body-force", "bodies": ["Cube"], "direction": [0, 1, 0], "value": "3*t"},
+    }
+    result.write(tmp_path / "case.toml")
+    read_case(tmp_path / "case.toml")
 
 
 def test_jumps_and_loads_that_end(tmp_path):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim.analysis.stepping import run
 from cutsim.cases import import_model, read_case
 from cutsim.materials.anisotropic import FungOrthotropic
 
@@ -120,8 +119,7 @@ def test_stretched_cube(tmp_path):
     result = import_model(write(tmp_path, Boundary=fixed + pulled, mesh=sets))
     simulation = read_case(write_case(result, tmp_path)).build(MPI.COMM_SELF)
     rows = []
-    for until, control in simulation.schedule:
-        run(simulation.problem, until, control, rows.append)
+    simulation.run(rows.append)
     young, nu, stretch = 3.0, 0.3, 1.5
     shear, lame = young / (2 * (1 + nu)), young * nu / ((1 + nu) * (1 - 2 * nu))
     lateral = 1 + simulation.mechanics.state.u.x.array.min()
@@ -246,6 +244,7 @@ def test_loads(tmp_path):
         '<surface_load name="p" type="pressure" surface="upper"><pressure lc="1">2</pressure></surface_load>'
         '<surface_load name="t" type="traction" surface="upper"><scale lc="1">1</scale><traction>3,0,4</traction>'
         "</surface_load>"
+        '<body_load type="const"><x>0</x><y>0</y><z lc="1">10</z></body_load>'
         '<nodal_load name="f" type="nodal_force" node_set="top"><value lc="1">0,-2,0</value></nodal_load>'
     )
     case, result = imported(tmp_path, Loads=loads)
@@ -255,6 +254,8 @@ def test_loads(tmp_path):
         "t": {
             "kind": "traction", "facets": "upper", "direction": [0.6, 0, 0.8], "value": "5*t", "current_area": True,
         },
+        # against its component in FEBio
+        "weight_z": {"kind": "weight", "direction": "-z", "value": "10*t"},
         "f": {"kind": "force", "vertices": "top", "direction": [0, -1, 0], "value": "2*t"},
     }  # fmt: skip
 

@@ -36,15 +36,16 @@ def import_abaqus(path: Path, mesh_file: str) -> Imported:
         OSError: It cannot be read.
     """
     file = AbaqusFile(path)
-    for located in file.take(*_READ_ELSEWHERE):
-        if located.card.keyword == "HEADING" and located.card.data:
-            file.draft.tables["title"] = located.card.data[0][1]
-    file.draft.tables.setdefault("title", path.stem)
-    steps = translate_steps(file)
-    dim = _mesh(file, mesh_file)
-    young = _bodies(file, dim)
-    Conditions(file, steps, dim).translate()
-    translate_contacts(file, young)
+    with file.naming():
+        for located in file.take(*_READ_ELSEWHERE):
+            if located.card.keyword == "HEADING" and located.card.data:
+                file.draft.tables["title"] = located.card.data[0][1]
+        file.draft.tables.setdefault("title", path.stem)
+        steps = translate_steps(file)
+        dim = _mesh(file, mesh_file)
+        young = _bodies(file, dim)
+        Conditions(file, steps, dim).translate()
+        translate_contacts(file, young)
     for card in file.leftovers():
         file.draft.untranslated(card.line, f"*{card.keyword}: has no counterpart")
     return file.draft.finished()
@@ -103,7 +104,7 @@ def _section(file: AbaqusFile, located: Located, counterpart: Counterpart, dim: 
         values |= _elements(file, name, counterpart)
         if counterpart.relaxation is not None:
             values["relaxation"] = parameters(counterpart.relaxation)
-        if file.draft.tables["analysis"]["type"] == "dynamic":
+        if counterpart.density is not None:
             values["density"] = counterpart.density
         file.draft.add("bodies", name, values, comment)
 

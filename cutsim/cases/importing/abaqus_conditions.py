@@ -5,10 +5,10 @@ from math import hypot
 from types import MappingProxyType
 from typing import Any
 
-from cutsim.cases.importing.abaqus_file import AbaqusFile, Located
+from cutsim.cases.importing.abaqus_file import AbaqusFile, Located, entry
 from cutsim.cases.importing.abaqus_history import Amplitudes, History, Step
 from cutsim.cases.importing.draft import Untranslatable
-from cutsim.readers.abaqus_cards import Card, real
+from cutsim.readers.abaqus_cards import Card, real, whole
 
 #: Directions that a named condition holds.
 _NAMED: Mapping[str, tuple[int, ...]] = MappingProxyType(
@@ -16,6 +16,8 @@ _NAMED: Mapping[str, tuple[int, ...]] = MappingProxyType(
 )
 _AXES = "xyz"
 _ROTATIONS = (4, 5, 6)
+_ON_NODES = ("vertices", "points")
+_BODY_FORCES = ("GRAV", "BX", "BY", "BZ")
 
 
 class Conditions:
@@ -64,18 +66,18 @@ class Conditions:
         if released and self._supports.keys() - named:
             raise Untranslatable("OP=NEW: what is held before is not released here", card.line)
 
-    def _nodes(self, entry: str, part: str, line: int) -> tuple[str, str]:
+    def _nodes(self, wanted: str, part: str, line: int) -> tuple[str, str]:
         """Key and value of the case file for a node or a set of nodes; a node is given by its position."""
-        if entry.isdecimal():
-            found = (self._file.mesh.numbers == int(entry)).nonzero()[0]
+        if wanted.isdecimal():
+            found = (self._file.mesh.numbers == int(wanted)).nonzero()[0]
             if len(found) != 1:
-                raise ValueError(f"there is no node {entry}, or more than one")
+                raise ValueError(f"there is no node {wanted}, or more than one")
             return "points", repr(self._file.mesh.points[found[0]][: self._dim].tolist())
-        names = self._file.find(self._file.mesh.node_sets, entry, part)
+        names = self._file.find(self._file.mesh.node_sets, wanted, part)
         if not names:
-            raise ValueError(f"there is no set of nodes {entry!r}")
+            raise ValueError(f"there is no set of nodes {wanted!r}")
         if len(names) > 1:
-            raise Untranslatable(f"the set {entry!r} is one of {len(names)} instances", line)
+            raise Untranslatable(f"the set {wanted!r} is one of {len(names)} instances", line)
         quadratic = self._file.draft.tables.get("mesh", {}).get("degree", 1) > 1
         return "facets" if quadratic else "vertices", names[0]
 
@@ -110,6 +112,8 @@ class Conditions:
             yield self._on_nodes(part, line, entries)
         elif card.keyword == "DSLOAD":
             yield self._on_surface(card, part, line, entries)
+        elif entry(entries, 1).upper() in _BODY_FORCES:
+            yield self._on_bodies(entries, line)
         else:
             raise Untranslatable(
                 f"{' '.join(entries[1:2])} on elements: give the faces as a *SURFACE with *DSLOAD", line
@@ -117,21 +121,21 @@ class Conditions:
 
     def _on_nodes(self, part: str, line: int, entries: list[str]) -> tuple[tuple[Any, ...], float]:
         key, where = self._nodes(entries[0], part, line)
-        dof = int(real(entries[1]))
+        dof = whole(entry(entries, 1))
         if key == "facets" or dof not in range(1, self._dim + 1):
             raise Untranslatable(f"a force along {dof} on {entries[0]!r}", line)
-        return ("CLOAD", key, where, tuple(float(i == dof - 1) for i in range(self._dim))), real(entries[2])
+        return ("CLOAD", key, where, tuple(float(i == dof - 1) for i in range(self._dim))), real(entry(entries, 2))
 
     def _on_surface(self, card: Card, part: str, line: int, entries: list[str]) -> tuple[tuple[Any, ...], float]:
         names = self._file.find(self._file.mesh.facet_sets, entries[0], part)
         if len(names) != 1:
             raise ValueError(f"there is no surface {entries[0]!r} of elements")
-        kind, value = entries[1].upper(), real(entries[2])
+        kind, value = entry(entries, 1).upper(), real(entry(entries, 2))
         if kind == "P":
             return ("DSLOAD", "pressure", names[0], ()), value
         if kind not in ("TRVEC", "TRSHR"):
             raise Untranslatable(f"{kind} on {entries[0]!r}", line)
-        vector = [real(entry) for entry in entries[3 : 3 + self._dim]]
+        vector = [real(text) for text in entries[3 : 3 + self._dim]]
         size = hypot(*vector)
         if kind == "TRSHR" or not size:
             raise Untranslatable(f"{kind} on {entries[0]!r}", line)
@@ -141,20 +145,36 @@ class Conditions:
             )
         return ("DSLOAD", "traction", names[0], tuple(c / size for c in vector)), value
 
+    def _on_bodies(self, entries: list[str], line: int) -> tuple[tuple[Any, ...], float]:
+        """Weight, or a force per volume along an axis."""
+        bodies = self._file.draft.tables.get("bodies", {})
+        sought = self._file.find(self._file.mesh.cell_sets, entries[0])
+        names = tuple(name for name, body in bodies.items() if body["cells"] in sought)
+        if entries[0] and not names:
+            raise Untranslatable(f"{entries[1]} on {entries[0]!r}, which is no body", line)
+        kind, value = entry(entries, 1).upper(), real(entry(entries, 2))
+        if kind != "GRAV":
+            return ("DLOAD", "body-force", names, tuple(float(c == kind[1]) for c in "XYZ"[: self._dim])), value
+        vector = [real(text) for text in entries[3 : 3 + self._dim]]
+        if not (size := hypot(*vector)):
+            raise Untranslatable("GRAV without a direction in the plane of the mesh", line)
+        return ("DLOAD", "weight", names, tuple(c / size for c in vector)), size * value
+
     def _write_loads(self) -> None:
         for key, history in self._loads.items():
-            value = {"value": history.timed().value(self._file.end)}
-            keyword, kind, where, direction = key
-            if keyword == "CLOAD":
-                place = [_point(where)] if kind == "points" else where
-                values = {"kind": "force", kind: place, "direction": list(direction), **value}
-            elif kind == "pressure":
-                values = {"kind": "pressure", "facets": where, **value}
+            _, kind, where, direction = key
+            values: dict[str, Any] = {"kind": "force" if kind in _ON_NODES else kind}
+            label = "node" if kind == "points" else "_".join(where) if isinstance(where, tuple) else where
+            if kind in _ON_NODES:
+                values[kind] = [_point(where)] if kind == "points" else where
+            elif isinstance(where, tuple):
+                values |= {"bodies": list(where)} if where else {}
             else:
-                values = {"kind": "traction", "facets": where, "direction": list(direction), **value}
-                values |= {"current_area": True} if self._file.large else {}
-            label = "node" if kind == "points" else where
-            self._file.draft.add("loads", f"{label}_{values['kind']}", values, self._comments[key])
+                values["facets"] = where
+            values |= {"direction": list(direction)} if direction else {}
+            values["value"] = history.timed().value(self._file.end)
+            values |= {"current_area": True} if kind == "traction" and self._file.large else {}
+            self._file.draft.add("loads", f"{label}_{values['kind']}".strip("_"), values, self._comments[key])
 
 
 def _held(entries: list[str], line: int) -> Iterator[tuple[int, float]]:
@@ -166,7 +186,7 @@ def _held(entries: list[str], line: int) -> Iterator[tuple[int, float]]:
     if not word.isdecimal():
         raise Untranslatable(f"condition {word!r}", line)
     first = int(word)
-    last = int(real(entries[2])) if len(entries) > 2 and entries[2] else first
+    last = whole(entries[2]) if len(entries) > 2 and entries[2] else first
     if last > max(_ROTATIONS):
         raise Untranslatable(f"degree of freedom {last}", line)
     value = real(entries[3]) if len(entries) > 3 else 0.0

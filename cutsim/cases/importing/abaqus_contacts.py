@@ -49,8 +49,7 @@ def _interactions(file: AbaqusFile) -> dict[str, dict[str, Card]]:
         card = located.card
         if card.keyword == "SURFACE INTERACTION":
             file.read(card)
-            with file.naming():
-                current = found.setdefault(card.needed("NAME").upper(), {})
+            current = found.setdefault(card.needed("NAME").upper(), {})
         elif card.keyword in _OPTIONS and located.step == 0:
             file.read(card)
             current[card.keyword] = card
@@ -82,7 +81,7 @@ def _law(file: AbaqusFile, options: dict[str, Card]) -> dict[str, Any]:
         if kind not in ("HARD", "LINEAR") or "NO SEPARATION" in behaviour.parameters:
             raise Untranslatable(f"*SURFACE BEHAVIOR with {', '.join(behaviour.parameters)}", behaviour.line)
         if kind == "LINEAR":
-            values["contact"] = {"stiffness": file.numbers(behaviour)[0]}
+            values["contact"] = {"stiffness": file.numbers(behaviour, 1)[0]}
     return values
 
 

@@ -56,6 +56,8 @@ class AbaqusFile:
         """Name the file in errors of this context."""
         try:
             yield
+        except MalformedFile:
+            raise
         except ValueError as error:
             raise MalformedFile(f"{self.path.name}: {error}") from None
 
@@ -76,19 +78,25 @@ class AbaqusFile:
 
     @contextmanager
     def attempt(self, card: Card) -> Iterator[None]:
-        """Note that a keyword has no counterpart if it turns out so in this context; name the file in other errors."""
-        with self.naming():
-            try:
-                yield
-            except Untranslatable as problem:
-                self.draft.untranslated(problem.line, f"*{card.keyword}: {problem}")
+        """Note that a keyword has no counterpart if it turns out so in this context."""
+        try:
+            yield
+        except Untranslatable as problem:
+            self.draft.untranslated(problem.line, f"*{card.keyword}: {problem}")
 
-    def numbers(self, card: Card) -> list[float]:
-        """All numbers of the data of a keyword."""
+    def numbers(self, card: Card, least: int = 0) -> list[float]:
+        """All numbers of the data of a keyword.
+
+        Raises:
+            ValueError: There are fewer than `least`.
+        """
         found = []
         for line, entries in card.rows():
             with card.at(line):
                 found += [real(entry) for entry in entries]
+        if len(found) < least:
+            with card.at():
+                raise ValueError(f"must have {least} numbers or more, found {len(found)}")
         return found
 
     def find(self, names: Iterable[str], wanted: str, part: str = "") -> list[str]:
@@ -112,6 +120,17 @@ class AbaqusFile:
             if located.card.keyword == "INSTANCE" and located.card.get("PART").upper() == part.upper()
         ]
         return found or [part]
+
+
+def entry(entries: list[str], i: int) -> str:
+    """An entry of a line of data.
+
+    Raises:
+        ValueError: The line is shorter.
+    """
+    if i >= len(entries):
+        raise ValueError(f"must have {i + 1} entries or more, found {', '.join(entries)[:60]!r}")
+    return entries[i]
 
 
 def _located(cards: Iterable[Card]) -> Iterator[Located]:

@@ -44,8 +44,7 @@ def translate_steps(file: AbaqusFile) -> list[Step]:
             file.draft.untranslated(
                 head.line, "*STEP: no *STATIC, *VISCO or *DYNAMIC; taken to be static over a time of 1"
             )
-        with file.naming():
-            first, period, largest = _increments(file, card)
+        first, period, largest = _increments(file, card)
         sizes.append((first, largest, card is not None and "DIRECT" in card.parameters))
         usual = "STEP" if card is not None and card.keyword == "DYNAMIC" else "RAMP"
         steps.append(Step(start, start + period, (head.get("AMPLITUDE").upper() or usual) == "RAMP"))

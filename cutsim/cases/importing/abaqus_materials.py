@@ -14,7 +14,7 @@ from cutsim.cases.importing.draft import Untranslatable
 from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, Material, StVenantKirchhoff
 from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Yeoh
 from cutsim.materials.viscoelastic import Prony
-from cutsim.readers.abaqus_cards import Card
+from cutsim.readers.abaqus_cards import Card, real
 
 #: Bulk modulus over shear modulus of what is incompressible in Abaqus (D = 0).
 _INCOMPRESSIBLE = 1000.0
@@ -44,8 +44,7 @@ def definitions(file: AbaqusFile) -> dict[str, Definition]:
         card = located.card
         if card.keyword == "MATERIAL":
             file.read(card)
-            with file.naming():
-                current = found.setdefault(card.needed("NAME").upper(), Definition(card))
+            current = found.setdefault(card.needed("NAME").upper(), Definition(card))
         elif current is not None and card.keyword in _OPTIONS:
             file.read(card)
             current.options[card.keyword] = card
@@ -66,7 +65,7 @@ def counterpart(file: AbaqusFile, definition: Definition) -> Counterpart:
     if elastic is None:
         raise Untranslatable("neither *ELASTIC nor *HYPERELASTIC", definition.head.line)
     material = _elastic(file, elastic)
-    density = file.numbers(options["DENSITY"])[0] if "DENSITY" in options else None
+    density = file.numbers(options["DENSITY"], 1)[0] if "DENSITY" in options else None
     if "VISCOELASTIC" not in options:
         return Counterpart(material, density=density)
     return _relaxing(file, material, elastic, options["VISCOELASTIC"], density)
@@ -76,7 +75,7 @@ def _elastic(file: AbaqusFile, card: Card) -> Material:
     make = _linear if card.keyword == "ELASTIC" else _hyperelastic
     if len(card.data) > 1 and "OGDEN" not in card.parameters and "YEOH" not in card.parameters:
         raise Untranslatable("it depends on temperature or on more", card.line)
-    given = file.numbers(card)
+    given = file.numbers(card, 1)
     try:
         return make(file, card, given)
     except ValueError as error:
@@ -195,7 +194,7 @@ def _relaxing(file: AbaqusFile, material: Material, elastic: Card, card: Card, d
     rows = []
     for line, entries in card.rows():
         with card.at(line):
-            rows.append(_padded([float(entry or 0) for entry in entries], 3)[:3])
+            rows.append(_padded([real(entry) for entry in entries], 3)[:3])
     if any(k for _, k, _ in rows):
         file.draft.difference(card.line, "*VISCOELASTIC: the volumetric part does not relax here")
     series = [(g, time) for g, _, time in rows if g]

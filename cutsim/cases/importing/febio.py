@@ -159,6 +159,9 @@ class _Model:
             values = {"cells": part, "material": table(counterpart.material), **self._body(part, counterpart)}
             self._draft.add("bodies", part, values, comment)
 
+    def _has_weight(self) -> bool:
+        return any(load.tag == "body_load" for section in self._file.sections("Loads") for load in section)
+
     def _body(self, part: str, counterpart: Counterpart) -> dict[str, object]:
         shapes = {block.shape for block in self._context.mesh.blocks if block.name == part}
         # FEBio integrates the pressure of uncoupled materials once in a hexahedron, and all else fully
@@ -166,6 +169,6 @@ class _Model:
         values: dict[str, object] = {"volumetric": "mixed" if mixed else "full"}
         if counterpart.relaxation is not None:
             values["relaxation"] = parameters(counterpart.relaxation)
-        if self._draft.tables.get("analysis", {}).get("type") == "dynamic":
+        if self._draft.tables["analysis"]["type"] == "dynamic" or self._has_weight():
             values["density"] = counterpart.density
         return values

@@ -26,12 +26,19 @@ def translate_loads(context: Context) -> None:
 
 def _translate(context: Context, element: LinedElement) -> None:
     kind = element.get("type", "") if element.tag == "surface_load" else element.tag
-    kind = element.get("type", kind) if element.tag == "nodal_load" else kind
+    kind = element.get("type", kind) if element.tag in ("nodal_load", "body_load") else kind
     translate = _KINDS.get(kind)
     if translate is None:
         raise Untranslatable("has no counterpart", element.line)
     values = translate(context, element)
-    context.draft.add("loads", element.get("name") or kind, values, f"line {element.line}")
+    comment, name = f"line {element.line}", element.get("name") or kind
+    if element.tag == "body_load":
+        for axis, value in values.items():
+            context.draft.add(
+                "loads", f"weight_{axis[-1]}", {"kind": "weight", "direction": axis, "value": value}, comment
+            )
+    else:
+        context.draft.add("loads", name, values, comment)
 
 
 def _surface(context: Context, element: LinedElement) -> str:
@@ -108,6 +115,21 @@ def _vertices(context: Context, element: LinedElement) -> dict[str, Any]:
     return where
 
 
+def _weight(context: Context, element: LinedElement) -> dict[str, Any]:
+    """Acceleration along each axis, by its direction; a force of FEBio acts against its components."""
+    if element.get("elem_set"):
+        raise Untranslatable("on a set of elements", element.line)
+    found = {f"-{axis}": context.file.child(element, axis) for axis in AXES}
+    values = {axis: context.file.timed(child) for axis, child in found.items() if child is not None}
+    return {axis: value.value(context.file.end) for axis, value in values.items() if not value.vanishes}
+
+
 _KINDS: Mapping[str, Callable[[Context, LinedElement], dict[str, Any]]] = MappingProxyType(
-    {"pressure": _pressure, "traction": _traction, "nodal_load": _nodal_load, "nodal_force": _nodal_force}
+    {
+        "pressure": _pressure,
+        "traction": _traction,
+        "nodal_load": _nodal_load,
+        "nodal_force": _nodal_force,
+        "const": _weight,
+    }
 )

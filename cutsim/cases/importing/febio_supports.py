@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import numpy as np
+
 from cutsim.cases.importing.curves import Timed
 from cutsim.cases.importing.draft import MalformedFile, Untranslatable
 from cutsim.cases.importing.febio_context import AXES, Context
@@ -54,6 +56,8 @@ def nodes_of_set(context: Context, element: LinedElement) -> dict[str, Any]:
     if name:
         if name not in context.mesh.node_sets:
             raise MalformedFile(f"{context.file.place(element)}: there is no node set {name!r}")
+        if context.rigid_parts and not np.isin(context.mesh.node_sets[name], context.deformable_nodes).any():
+            raise Untranslatable("all its nodes belong to rigid bodies", element.line)
         return {"facets" if context.quadratic else "vertices": name}
     nodes = [context.file.read(child) for child in children(element) if child.tag == "node"]
     if not nodes:

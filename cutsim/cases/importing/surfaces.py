@@ -71,7 +71,7 @@ def mean_size(mesh: MeshData, surface: str) -> float:
         np.linalg.norm(mesh.points[facets] - mesh.points[np.roll(facets, 1, axis=1)], axis=2).ravel()
         for facets in mesh.facet_sets[surface]
     ]
-    return float(np.concatenate(lengths).mean())
+    return float(np.concatenate(lengths).mean()) if lengths else 1.0
 
 
 def area_over_volume(mesh: MeshData, surface: str) -> float:
