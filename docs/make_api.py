@@ -34,6 +34,7 @@ GROUPS = {
     "Record, read and plot results": ("results", "cutsim.results"),
     "Start from a ready-made problem": ("studies", "cutsim.studies"),
     "Find parameters from measurements": ("identify", "cutsim.identify"),
+    "Read and run case files": ("cases", "cutsim.cases"),
     "Write a term of your own": ("base", "cutsim.base.terms"),
 }
 
@@ -107,11 +108,12 @@ def modules_of_all():
 
 def entry(thing, promises):
     """A name with its signature and line, and what its instances can do."""
-    kind = "" if is_protocol(thing) else signature(thing)
+    read = hasattr(thing, "model_fields")  # what files give and scripts do not make
+    kind = "" if read or is_protocol(thing) else signature(thing)
     lines = [f"- `{thing.__name__}{kind}`: {line(thing)}"]
     if inspect.isclass(thing):
         for name, member in vars(thing).items():
-            if name.startswith("_") or (name in promises and not is_protocol(thing)):
+            if name.startswith(("_", "model_")) or (name in promises and not is_protocol(thing)):
                 continue
             function = member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
             if isinstance(function, property):
