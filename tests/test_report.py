@@ -86,7 +86,10 @@ def test_page_has_the_numbers_and_needs_nothing_else(tmp_path):
 )
 def test_what_speaks_against_a_run_is_said_first(tmp_path, summary, grade, sentence):
     write_run(tmp_path, **summary)
+    (tmp_path / "checkpoint").mkdir()
+    (tmp_path / "checkpoint" / "one.h5").touch()
     words = Page(write_report(tmp_path)).text
+    assert (f"cutsim resume {tmp_path.name}" in words) == (grade != "questionable")
     assert words.startswith(f"{grade}: {tmp_path.name} {tmp_path.name} {grade} ")
     assert sentence in words[:300] and all(reason in words[:400] for reason in summary.get("reasons", ()))
     assert "Not in this report" in words and "case.toml is not there" in words and "no animation" in words

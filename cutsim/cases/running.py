@@ -24,14 +24,13 @@ from cutsim.results.checkpoints import Checkpoints
 from cutsim.results.output import on_root, replace_file
 from cutsim.results.presentation import present
 from cutsim.results.recording import Recording
+from cutsim.results.report import CHECKPOINTS
 from cutsim.results.stage_recorder import Stages
 
 #: Name of the complete case in the folder of its run.
 CASE = "case.toml"
 #: Picture of the set-up there.
 SETUP = "setup.png"
-#: Folder of the checkpoints in that of the run.
-CHECKPOINTS = "checkpoint"
 #: Exit codes of ends before the time.
 NO_EQUILIBRIUM, CANNOT_WRITE, INTERRUPTED = 3, 4, 130
 

@@ -23,6 +23,8 @@ from cutsim.results.web_plots import columns_json, curves_json, energy_json
 
 logger = logging.getLogger(__name__)
 
+#: Folder of the checkpoints in that of a run.
+CHECKPOINTS = "checkpoint"
 #: Name of the report in the folder of a run or of a sweep.
 NAME = "report.html"
 
@@ -59,11 +61,13 @@ def write_report(folder: Path | str) -> Path:
         "animation": _embedded(_first(run.folder, "animation.mp4", "animation.gif")),
         "pictures": [_embedded(path) for path in pictures],
     }
+    resumable = not run.complete and any((run.folder / CHECKPOINTS).glob("*"))
     missing += [words for name, words in _MISSED.items() if not content[name]]
     numbers = {name: _number(value) for name, value in run.summary.items() if name not in _PLACED}
     page = _page(
-        "run.html", run=run, tiles=tiles(run), sizes=dict(_sizes(run)), numbers=numbers, missing=missing, **content
-    )
+        "run.html", run=run, tiles=tiles(run), sizes=dict(_sizes(run)), numbers=numbers, missing=missing,
+        resumable=resumable, **content,
+    )  # fmt: skip
     return _written(run.folder / NAME, page)
 
 
@@ -93,7 +97,8 @@ def write_sweep_report(folder: Path | str, runs: Mapping[Path, Mapping[str, Any]
     """
     read = [(RunFiles.read(path), varied) for path, varied in runs.items()]
     names = list(dict.fromkeys(name for _, varied in read for name in varied))
-    labels = [", ".join(f"{name} = {value}" for name, value in varied.items()) for _, varied in read]
+    varying = [name for name in names if len({str(varied.get(name)) for _, varied in read}) > 1] or names
+    labels = [", ".join(f"{name} = {varied.get(name)}" for name in varying) for _, varied in read]
     rows = [
         {"run": run, "values": [varied.get(name, "") for name in names], "link": _link(run.folder, folder)}
         for run, varied in read
