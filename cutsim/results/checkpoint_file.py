@@ -90,17 +90,31 @@ def write_checkpoint(path: Path, problem: Problem, case: Mapping[str, Any]) -> N
 
     Raises:
         OSError: It cannot be written, on all ranks; an older file of this name is as it was.
+        TypeError: A value that is remembered is no plain data, or its arrays belong to places that were not named.
     """
-    snapshot, quantities = save(problem), problem.state.memory.quantities
+    snapshot, quantities, comm = save(problem), problem.state.memory.quantities, problem.state.mesh.comm
     arrays: list[Array | None] = []
 
     def store(array: Array, places: Places | None) -> int:
-        arrays.append(array if places is None else places.gather(array))
+        arrays.append(_common(array, comm) if places is None else places.gather(array))
         return len(arrays) - 1
 
-    values = {name: pack(value, quantities[name].places, store) for name, value in snapshot.values.items()}
+    values = {}
+    for name, value in snapshot.values.items():
+        try:
+            values[name] = pack(value, quantities[name].places, store)
+        except TypeError as error:
+            raise TypeError(f"{name} cannot be written: {error}") from error
     head = asdict(header(problem, case))
-    on_root(problem.state.mesh.comm, lambda: replace_file(path, _file(head, values, arrays)))
+    on_root(comm, lambda: replace_file(path, _file(head, values, arrays)))
+
+
+def _common(array: Array, comm: MPI.Comm) -> Array:
+    """An array that is the same on all ranks. Collective."""
+    shapes = set(comm.allgather(array.shape))
+    if len(shapes) > 1:
+        raise TypeError(f"its arrays have the shapes {sorted(shapes)} on the ranks; register it with places=")
+    return array
 
 
 def read_checkpoint(path: Path, problem: Problem, case: Mapping[str, Any]) -> None:

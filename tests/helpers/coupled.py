@@ -63,7 +63,7 @@ def sliding(comm=MPI.COMM_WORLD):
 
     With inertia, relaxation, augmented contact of crack and pair, expansion, and heat across crack and pair.
     """
-    boxes = ((0, 0, -1), (1.4, 1, 0), (2, 2, 1)), ((0, 0, 0), (1, 1, 1), (1, 1, 2))
+    boxes = ((0, 0, -1), (1.4, 1, 0), (2, 1, 1)), ((0, 0, 0), (1, 1, 1), (2, 2, 2))
     b = stack(*boxes, simplices=True, comm=comm, cracked=lambda x: np.isclose(x[2], 0.5))
     state, domain = b.state, b.state.mesh
     glued = mesh.locate_entities(domain, 2, lambda x: np.isclose(x[2], 0.5))
