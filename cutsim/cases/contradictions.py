@@ -7,6 +7,7 @@ from cutsim.cases.geometries import LAMINATE
 from cutsim.cases.keys import Keys
 from cutsim.cases.schema_parts import Tool, Weight
 
+_ABSOLUTE_ZERO = {"K": 0.0, "degC": -273.15}
 #: Where something is wrong, what, and the value.
 Problem = tuple[Keys, str, Any]
 
@@ -17,11 +18,42 @@ def contradictions(valid: Mapping[str, Any]) -> Iterator[Problem]:
     Args:
         valid: Those tables that are valid by themselves; what concerns others is not looked at.
     """
-    for check in (_materials, _laws, _layers, _insertion, _end, _tools, _dynamics, _heat):
+    for check in (_dimension, _materials, _laws, _layers, _insertion, _end, _tools, _dynamics, _heat):
         try:
             yield from check(valid)
         except KeyError:  # it concerns a table that is not valid
             continue
+
+
+def _dimension(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    """Vectors have as many components as the mesh."""
+    mesh = valid["mesh"]
+    gdim = (3 if "width" in mesh.set else 2) if mesh.geometry == LAMINATE else mesh.dim
+    if gdim is None:
+        yield ("mesh", "dim"), "missing, must be given: 2 or 3, the dimension of the mesh and of its space", None
+        return
+    for keys, vector in _vectors(valid):
+        if isinstance(vector, tuple) and len(vector) != gdim:
+            yield keys, f"must have {gdim} components, as the mesh has dimensions", list(vector)
+        if gdim == 2 and vector in ("z", "-z"):
+            yield keys, "must be another axis: the mesh is flat", vector
+
+
+def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
+    """Positions and directions of a case."""
+    for name, tool in valid.get("tools", {}).items():
+        key, path = ("tools", name), tool.path
+        yield (*key, "position"), tool.position
+        yield from (((*key, "path", "points", i), p) for i, p in enumerate(getattr(path, "points", ())))
+        yield from (((*key, "path", part), getattr(path, part, None)) for part in ("start", "velocity", "stroke"))
+        for part in getattr(type(tool.made), "directions", ()):
+            yield (*key, part), getattr(tool, part)
+    for table in ("supports", "loads"):
+        for name, entry in valid.get(table, {}).items():
+            yield (table, name, "direction"), getattr(entry, "direction", None)
+            yield from (((table, name, "points", i), p) for i, p in enumerate(getattr(entry, "points", ())))
+    for name, crack in valid.get("cracks", {}).items():
+        yield ("cracks", name, "plus"), None if isinstance(crack.plus, str) else crack.plus
 
 
 def _materials(valid: Mapping[str, Any]) -> Iterator[Problem]:
@@ -125,7 +157,9 @@ def _dynamics(valid: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _heat(valid: Mapping[str, Any]) -> Iterator[Problem]:
-    heat, bodies = valid["heat"], valid["bodies"]
+    heat, bodies, unit = valid["heat"], valid["bodies"], valid["units"].temperature
+    if heat is not None and heat.initial < (zero := _ABSOLUTE_ZERO[unit]):
+        yield ("heat", "initial"), f"must be at least absolute zero, {zero:g} {unit}", heat.initial
     names = list(bodies) or [layer.name for layer in valid["layers"]] or ["body"]
     for name in names:
         if heat is not None and name not in heat.bodies:

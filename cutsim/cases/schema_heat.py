@@ -16,7 +16,7 @@ from cutsim.base.units import (
 from cutsim.cases.constructed import FromTable
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyName, CrackName, Groups, PairName, ToolName
-from cutsim.cases.tables import FORM, Table, Varying, chosen_by
+from cutsim.cases.tables import FORM, NONNEGATIVE, POSITIVE, Table, Varying, chosen_by
 from cutsim.heat.contact_heat import ContactHeat, HeatLaw
 
 Warmth = Annotated[TimeValue, Varying("temperature")]
@@ -32,11 +32,13 @@ class HeatBody(Table):
         source: Heat source per reference volume [power/volume].
     """
 
-    capacity: SpecificHeat
+    capacity: Annotated[SpecificHeat, POSITIVE]
     conductivity: Annotated[
-        Annotated[Conductivity, Tag("<single>")] | Annotated[tuple[tuple[Conductivity, ...], ...], Tag("<list>")], FORM
+        Annotated[Conductivity, NONNEGATIVE, Tag("<single>")]
+        | Annotated[tuple[tuple[Conductivity, ...], ...], Tag("<list>")],
+        FORM,
     ]
-    density: Density | None = None
+    density: Annotated[Density, POSITIVE] | None = None
     source: Annotated[TimeValue, Varying("heat source")] = 0.0
 
 
@@ -67,7 +69,7 @@ class Convection(Table):
 
     kind: Literal["convection"]
     facets: Groups
-    coefficient: Conductance
+    coefficient: Annotated[Conductance, NONNEGATIVE]
     ambient: Warmth
     corners: tuple[Time, ...] = ()
 
@@ -121,7 +123,7 @@ class Heat(Table):
     """
 
     initial: TemperatureValue
-    iterate: TemperatureDifference | None = None
+    iterate: Annotated[TemperatureDifference, POSITIVE] | None = None
     bodies: dict[BodyName, HeatBody] = Field(min_length=1)
     cracks: dict[CrackName, Annotated[ContactHeat, FromTable()]] = Field(default_factory=dict)
     pairs: dict[PairName, Annotated[ContactHeat, FromTable()]] = Field(default_factory=dict)

@@ -7,7 +7,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from cutsim.base.checks import require
 from cutsim.base.units import Length, Number
 from cutsim.cases.names import ExistingFile, Geometry, GeometryParameter, Groups
-from cutsim.cases.tables import Flag, Free, Table
+from cutsim.cases.tables import POSITIVE, Flag, Free, Table
 
 Merge = Annotated[
     Annotated[Flag, Tag("<all>")] | Annotated[tuple[tuple[str, str], ...], Tag("<pairs>")],
@@ -26,7 +26,7 @@ class Mesh(Table):
         scale: Length in the units of the case of one unit of the file.
         merge: Whether nodes of the file that lie on each other become one: true, false, or pairs of groups of cells
             between which they do.
-        dim: Dimension of the mesh and of its space; by default that of the geometry, or 3 for a file.
+        dim: Dimension of the mesh and of its space; needed, but for a laminate, which is flat without a width.
         degree: Degree of the displacement.
         axisymmetric: Whether the mesh is the meridian plane of a body of revolution about x = 0.
         open: Groups of facets along which the body is cut from the start, with nothing between the faces.
@@ -36,7 +36,7 @@ class Mesh(Table):
     set: dict[GeometryParameter, Free] = Field(default_factory=dict)
     file: ExistingFile | None = None
     only: tuple[str, ...] = ()
-    scale: Number = 1.0
+    scale: Annotated[Number, POSITIVE] = 1.0
     merge: Merge = False
     dim: Literal[2, 3] | None = None
     degree: Literal[1, 2] = 1

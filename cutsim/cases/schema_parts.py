@@ -1,15 +1,17 @@
 """Schema of case files: bodies, cracks, pairs of surfaces, tools, supports and loads."""
 
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from cutsim.base.checks import require
 from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, Viscosity
 from cutsim.cases.constructed import Constructed, FromTable, With
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyNames, ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
-from cutsim.cases.tables import FORM, Flag, Table, Varying, chosen_by
+from cutsim.cases.tables import FORM, NONNEGATIVE, POSITIVE, Flag, Table, Varying, chosen_by
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 from cutsim.tools.pointed import Pointed
@@ -44,9 +46,9 @@ class Deformable(Table):
 
     material: AnyMaterial | None = None
     volumetric: Volumetric = "auto"
-    viscosity: Viscosity = 0.0
+    viscosity: Annotated[Viscosity, NONNEGATIVE] = 0.0
     relaxation: Annotated[Prony, FromTable()] | None = None
-    density: Density | None = None
+    density: Annotated[Density, POSITIVE] | None = None
     thermoelastic: Annotated[ThermoElastic, FromTable()] | None = None
 
 
@@ -72,7 +74,7 @@ class Layer(Deformable):
     """
 
     name: str
-    thickness: Length
+    thickness: Annotated[Length, POSITIVE]
     law: Law | None = None
 
 
@@ -90,11 +92,11 @@ class Interface(Table):
     """
 
     law: LawOrNone = None
-    friction: Friction | None = None
+    friction: Annotated[Friction, NONNEGATIVE] | None = None
     contact: Contact | None = None
-    allowed_penetration: Length | None = None
-    allowed_slip: Length | None = None
-    young: Stress | None = None
+    allowed_penetration: Annotated[Length, POSITIVE] | None = None
+    allowed_slip: Annotated[Length, POSITIVE] | None = None
+    young: Annotated[Stress, POSITIVE] | None = None
 
 
 class Crack(Interface):
@@ -129,7 +131,7 @@ class Pair(Interface):
     master: Groups
     small_sliding: Flag = False
     two_pass: Flag = False
-    search: Length | None = None
+    search: Annotated[Length, POSITIVE] | None = None
 
 
 class Polyline(Table):
@@ -147,6 +149,8 @@ class Polyline(Table):
     def _as_many(self) -> "Polyline":
         if len(self.times) != len(self.points) or not self.times:
             raise ValueError("must have as many points as times, at least one")
+        rising = all(a < b for a, b in pairwise(self.times))
+        require("times", list(self.times), rising, "increasing")
         return self
 
 
@@ -163,7 +167,7 @@ class Saw(Table):
     start: tuple[Length, ...]
     velocity: tuple[Velocity, ...]
     stroke: tuple[Length, ...]
-    period: Time
+    period: Annotated[Time, POSITIVE]
 
 
 def _motion(value: Any) -> str:
@@ -188,7 +192,7 @@ class Tool(Constructed):
         contact: Contact law; by default a penalty of 10 E/h, and that of an inserted tool is its own.
     """
 
-    friction: Friction = 0.0
+    friction: Annotated[Friction, NONNEGATIVE] = 0.0
     surfaces: Surfaces = ()
     position: tuple[Displacement, ...] | None = None
     path: Motion | None = None
@@ -212,8 +216,8 @@ class SurfaceTool(Tool):
 
     shape: Literal["surface"]
     file: ExistingFile
-    scale: Number = 1.0
-    search: Length | None = None
+    scale: Annotated[Number, POSITIVE] = 1.0
+    search: Annotated[Length, POSITIVE] | None = None
 
 
 def _tool(value: Any) -> str:

@@ -13,7 +13,7 @@ from cutsim.base.units import Length, Number, Time
 from cutsim.bodies.schemes import Newmark, Scheme
 from cutsim.cases.constructed import Constructed, FromTable, With, annotated, choice, made, table_of
 from cutsim.cases.names import BodyName, CrackName, ToolName
-from cutsim.cases.tables import Flag, Table, Whole, chosen_by
+from cutsim.cases.tables import NONNEGATIVE, POSITIVE, Flag, Table, Whole, chosen_by
 from cutsim.studies.drive import Drive
 from cutsim.studies.fixture import Fixture
 
@@ -32,12 +32,12 @@ class Insertion(Constructed):
     """
 
     tool: ToolName = "tool"
-    depth: Length | None = None
-    push: Whole = 1
-    notch: Length = 0.0
+    depth: Annotated[Length, POSITIVE] | None = None
+    push: Annotated[Whole, POSITIVE] = 1
+    notch: Annotated[Length, NONNEGATIVE] = 0.0
     groups: tuple[str, str, str] = ("crack", "notch", "right")
     fixture: Annotated[Fixture, FromTable()] = Field(default_factory=Fixture)
-    damping: Time = 0.0
+    damping: Annotated[Time, NONNEGATIVE] = 0.0
 
     @property
     def drive(self) -> Drive:
@@ -57,7 +57,7 @@ class Analysis(Table):
     """
 
     type: Literal["quasi-static", "dynamic"] = "quasi-static"
-    until: Time | None = None
+    until: Annotated[Time, POSITIVE] | None = None
     scheme: Annotated[Scheme, FromTable()] = Field(default_factory=Newmark)
     mass: Literal["consistent", "lumped"] = "consistent"
 
@@ -97,9 +97,9 @@ class Solver(Table):
         petsc: PETSc options without prefix; they win over the presets.
     """
 
-    rtol: Number = 1e-8
-    dtol: Number | None = None
-    etol: Number | None = None
+    rtol: Annotated[Number, POSITIVE] = 1e-8
+    dtol: Annotated[Number, POSITIVE] | None = None
+    etol: Annotated[Number, POSITIVE] | None = None
     petsc: dict[str, Plain] = Field(default_factory=dict)
 
 
@@ -137,10 +137,10 @@ class DomainIntegral(Table):
     body: BodyName = "body"
     tip: tuple[Length, ...]
     direction: tuple[Number, ...]
-    inner: Length
-    outer: Length
+    inner: Annotated[Length, POSITIVE]
+    outer: Annotated[Length, POSITIVE]
     front: tuple[Number, ...] | None = None
-    length: Length | None = None
+    length: Annotated[Length, POSITIVE] | None = None
 
 
 Measure = Annotated[Front | DomainIntegral, Field(discriminator="kind"), chosen_by("kind", ["front", "j-integral"])]
@@ -163,7 +163,7 @@ class Output(Table):
 
     curve: tuple[str, str] | None = None
     mirror: tuple[Literal["x", "y", "z"], ...] = ()
-    every: Whole = 5
+    every: Annotated[Whole, NONNEGATIVE] = 5
     stress: Flag = True
     format: Literal["vtx", "vtu"] | None = None
     animation: Flag = True

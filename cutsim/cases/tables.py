@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -17,7 +18,7 @@ from pydantic import (
 from pydantic.functional_validators import PlainValidator
 from pydantic_core import CoreSchema, core_schema
 
-from cutsim.base.checks import Refused
+from cutsim.base.checks import Interval, Refused, nonnegative, positive
 from cutsim.base.units import Kind
 from cutsim.cases.docstrings import arguments_of
 from cutsim.cases.keys import nearest
@@ -91,6 +92,18 @@ Free = Annotated[float, PlainValidator(_free), WithJsonSchema(_NUMBER)]
 Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"anyOf": [{"type": "integer"}, {"type": "string"}]})]
 
 
+def within(interval: Interval) -> AfterValidator:
+    """Check that a number, if it is one, is in an interval."""
+
+    def check(value: Any) -> Any:
+        if isinstance(value, int | float) and value not in interval:
+            raise ValueError(f"must be {interval}")
+        return value
+
+    return AfterValidator(check)
+
+
+POSITIVE, NONNEGATIVE = within(positive), within(nonnegative)
 #: True or false.
 Flag = Annotated[bool, Strict()]
 
