@@ -239,6 +239,12 @@ def test_groups_that_make_no_mesh_are_refused(tmp_path, groups, message):
         read_geo(write(tmp_path, "squares.geo", SQUARES + groups), COMM, gdim=2)
 
 
+def test_a_geometry_without_groups_is_refused(tmp_path):
+    text = "Point(1) = {0, 0, 0}; Point(2) = {1, 0, 0}; Line(1) = {1, 2}; Extrude {0, 1, 0} { Curve{1}; }\n"
+    with pytest.raises(ValueError, match="there is no physical group: name the bodies"):
+        read_geo(write(tmp_path, "square.geo", text), COMM, gdim=2)
+
+
 def test_read_mesh_gives_the_same_mesh_as_its_geometry(tmp_path):
     groups = 'Physical Surface("a") = left[1]; Physical Surface("b") = right[1];'
     geo = write(tmp_path, "squares.geo", SQUARES + groups)

@@ -116,6 +116,7 @@ class SlipHistory:
         self._elastic = law.compliance if tolerance is None else 0.0
         symbolic: FrictionLaw = with_constants(state.mesh, law)
         n = len(rubbing.slip)
+        # one function for slip at the start of the step, elastic slip and penetration: each costs a form a coefficient
         self._memory = points.function(2 * n + 1)
         memory = [points.at(self._memory)[i] for i in range(2 * n + 1)]
         slid, closed, since = rubbing.slid(ufl.as_vector(memory[:n]), ufl.as_vector(memory[n:-1]), memory[-1])
@@ -152,6 +153,7 @@ class SlipHistory:
         new, old = self._evaluate(), self._known.committed
         size = np.linalg.norm(new["traction"], axis=-1)
         way = np.linalg.norm(new["slid"], axis=-1)
+        # what the penalty does not hold has slipped; at the limit itself rounding leaves a trace of it
         advance = new["advance"]
         advance[advance <= _STICKS * (advance + self._compliance * size)] = 0.0
         if self._tolerance is not None:
@@ -162,6 +164,7 @@ class SlipHistory:
         # the fraction of the way on which it slips; what is held elastically grows with the limit meanwhile
         free = new["closed"] * way - self._elastic * growth
         late = np.divide(advance, free, out=slipping.astype(float), where=free > advance)
+        # the audit takes the mean of the forces at both ends for the whole way, also where a point closes on it
         rubbed = np.where(slipping, advance + (1 - new["closed"]) * way, 0.0)
         mean = 0.5 * (new["share"] + old["share"])
         new["dissipated"] = old["dissipated"] + mean * (new["level"] - 0.5 * late * growth) * rubbed
@@ -175,6 +178,7 @@ class SlipHistory:
             return False
         new = self._evaluate()
         size = np.linalg.norm(new["traction"], axis=-1)
+        # only facets that stick as a whole are held in place
         sticks = ((size < (1 - _STICKS) * new["limit"]) & (new["share"] > 0)).all(axis=1)
         # a mean over the facet: a facet has more points than its nodes could hold in place one by one
         moved = new["closed"] * np.moveaxis(new["slid"], -1, 0)

@@ -52,6 +52,7 @@ class Points:
         t, outward, frames = self.tangents[rows], self.normals[rows], self.frames[rows]
         size = np.linalg.norm(outward, axis=-1)[:, None, None, None]
         side = np.sign(np.einsum("ni,ni->n", normals(t), outward))
+        # n = ν |n|, hence dν = (I − ν νᵀ) dn/|n|
         of_normal = side[:, None, None, None] * _normal_derivative(t) / size
         nu, first = frames[:, 0], frames[:, 1]
         d_nu = of_normal - np.einsum("ni,nj,njkl->nikl", nu, nu, of_normal)
@@ -111,6 +112,8 @@ class Pairs:
             d_jump = np.einsum("nai,nipj->napj", frames, apart)
             d_jump += np.einsum("ni,naipj->napj", self.distance[rows], d_frame)
             return d_jump, d_frame, d_xi
+        # the partner stays on the ray: across it d(x_m + t_k ξ_k − x_s − g ν) vanishes and gives dξ; along it this is
+        # the change of the gap
         tangents = self.tangents[rows]
         missing = self.hits.gap[rows, None, None, None] * d_frame[:, 0] - apart
         lateral = inverse(np.einsum("nai,nki->nak", frames[:, 1:], tangents))

@@ -35,6 +35,7 @@ def active(kinematics: PairKinematics, pairs: Pairs, tractions: Tractions) -> In
     points = pairs.hits.points
     something = np.any(tractions.values, axis=1) | np.any(tractions.stiffness, axis=(1, 2))
     rows = np.flatnonzero(np.asarray(something)[points] & (tractions.weights[points] > 0))
+    # pairs of the same two facets come one after the other: their blocks are added up before the matrix sees them
     return rows[np.lexsort((pairs.hits.facets[rows], points[rows] // len(kinematics.tables[0])))]
 
 

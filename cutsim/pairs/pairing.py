@@ -87,11 +87,14 @@ def near_facets(rays: Array, master: Array, margin: float) -> tuple[Indices, Ind
     reach = sum(0.5 * np.linalg.norm(high - low, axis=1).max(initial=0.0) for low, high in boxes) + 2 * margin
     if not (len(rays) and len(master)):
         return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+    # two boxes overlap only if their centres are no farther apart than half their diagonals together: the trees leave
+    # few candidates, and the boxes decide
     trees = [cKDTree(c) for c in centres]
     found = trees[0].sparse_distance_matrix(trees[1], reach, output_type="ndarray")
     s, m = found["i"].astype(np.int64), found["j"].astype(np.int64)
     (low_s, high_s), (low_m, high_m) = boxes
     overlap = ((low_s[s] <= high_m[m] + margin) & (low_m[m] <= high_s[s] + margin)).all(axis=1)
+    # an order that does not depend on how the trees were built
     order = np.lexsort((m[overlap], s[overlap]))
     return s[overlap][order], m[overlap][order]
 
@@ -126,12 +129,15 @@ def project(
     points, facets = points[near], facets[near]
     xi = _solve(y[..., 1:], shape)
     values, derivatives = shape.values(xi)
+    # in the frame of a point its ray is the first axis: along it lies the gap, and the rest is what Newton's method has
+    # left over where it did not converge
     gap = np.einsum("nb,nb->n", values, y[..., 0])
     off = np.abs(np.einsum("nb,nbi->ni", values, y[..., 1:])).max(axis=-1, initial=0.0)
     size = np.abs(y - y[:, :1]).max(axis=(1, 2), initial=0.0)
     outside = sides[facets] * _determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:])) < 0
     hit = shape.contains(xi) & (np.abs(gap) <= search) & (off <= EDGE * size) & outside
     points, facets, xi, gap = points[hit], facets[hit], xi[hit], gap[hit]
+    # a ray through an edge meets both its facets: the one of the lower number is taken, on every rank
     order = np.lexsort((facets, np.abs(gap), points))
     first = order[np.unique(points[order], return_index=True)[1]]
     return Hits(points[first], facets[first], xi[first], gap[first])
@@ -144,6 +150,7 @@ def _in_frames(
     centres = master.mean(axis=1)
     radii = np.linalg.norm(master - centres[:, None], axis=2).max(axis=1, initial=0.0)
     place = np.einsum("nij,nj->ni", frames[points], centres[facets] - x[points])
+    # a ray that misses the ball around a facet misses the facet: few pairs are left to Newton's method
     radius = (1 + 1e-6) * radii[facets]
     near = (np.abs(place[:, 0]) <= search + radius) & (np.linalg.norm(place[:, 1:], axis=1) <= radius)
     points, facets = points[near], facets[near]
@@ -158,6 +165,7 @@ def _solve(y: Array, shape: FacetShape) -> Array:
         values, derivatives = shape.values(xi)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = inverse(np.einsum("nab,nbi->nia", derivatives, y)) @ np.einsum("nb,nbi->ni", values, y)[..., None]
+        # the map of a warped facet may be singular farther out, where a step would lead far away
         new = np.clip(xi - step[..., 0], -_OUTSIDE, 1 + _OUTSIDE)
         change = np.abs(new - xi).max(initial=0.0)
         xi = new

@@ -122,9 +122,12 @@ class PairKinematics:
 
     def _sliding_jump(self, hits: Hits, values: Array, derivatives: Array) -> tuple[Array, Array]:
         """The jump, and its rate with the place on the master facet."""
+        # the point and the material point that it meets now, both where they were at the start of the step: a rigid
+        # motion of the two bodies together within the step is no slide
         frames, y = self._old.frames[hits.points, 1:], self._old_nodes[1][hits.facets]
         before = np.einsum("nb,nbi->ni", values, y) - self._old.x[hits.points]
         slid = self._slid.committed
+        # without partner a point is open, farther than any contact reaches
         jump = np.column_stack([np.full(len(slid), self._search), slid])
         # surfaces that just touch count as pressed: rounding would decide which points feel the other one
         touch = TOUCH * self._size

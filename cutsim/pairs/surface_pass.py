@@ -94,6 +94,7 @@ class SurfacePass:
     def partners(self) -> Pairs:
         """Pairs at the present displacement; the law knows their jump then."""
         u = self._state.u.x.array
+        # the search is collective: all ranks look again, or none
         same = self._seen is not None and np.array_equal(u, self._seen)
         if not self._state.mesh.comm.allreduce(same, op=MPI.LAND):
             self._pairs = self.kinematics.pairs(self.kinematics.nodes(u))

@@ -83,9 +83,14 @@ def extract(gdim: int) -> MeshData:
         gdim: Dimension of the mesh.
 
     Raises:
-        ValueError: The highest dimension of a physical group is another one.
+        ValueError: There is no physical group, or the highest dimension of one is another.
     """
     top = max((dim for dim, _ in gmsh.model.getPhysicalGroups()), default=None)
+    if top is None:
+        raise ValueError(
+            "there is no physical group: name the bodies, and the facets that are to be found again, such as "
+            'Physical Surface("body") = {1}; and end the last line of the file'
+        )
     if top != gdim:
         raise ValueError(f"gdim = {gdim}, but the highest dimension of a physical group is {top}")
     tags, x, _ = gmsh.model.mesh.getNodes()

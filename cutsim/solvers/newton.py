@@ -89,6 +89,7 @@ class NonlinearProblem:
         self._system = System(F, u, bcs, entity_maps, structure)
         self.known, self.fixed = self._system.forces.known, self._system.forces.fixed
         free_dropped(self._system.comm)
+        # nothing that is prescribed has a reaction then: the residual at the start is the only force to compare with
         criteria = replace(criteria, by_start=criteria.by_start or not (bcs or structure.directions))
         self._iterations = Iterations(self._system, criteria, self._options)
         self._force = 0.0
@@ -132,6 +133,7 @@ class NonlinearProblem:
             self._iterations.line_search = line_search
         with Timer("~cutsim: nonlinear solve"):
             outcome = self._iterations.run(self._force)
+        # the scale of forces by which the next solve is judged: that of a failed one would be a wild iterate's
         if outcome.converged:
             self._force = self._iterations.force
         return outcome

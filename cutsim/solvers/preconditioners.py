@@ -103,6 +103,8 @@ def _factor(symmetric: bool) -> dict[str, Any]:
 
 def _schur(amg: Mapping[str, Any]) -> dict[str, Any]:
     """Block elimination of the displacement: multigrid for it, the diagonal of its Schur complement for the rest."""
+    # with GMRES on the right an upper factor is enough: were its blocks exact, two iterations would do (Murphy, Golub
+    # and Wathen 2000); "selfp" is the complement with the diagonal in place of the block, sparse and cheap
     split = {
         "pc_type": "fieldsplit",
         "pc_fieldsplit_type": "schur",
@@ -164,6 +166,7 @@ def rigid_motions(x: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _orthonormalise(vectors: list[PETSc.Vec]) -> None:
+    # Gram and Schmidt's method as modified by subtracting one after the other; the modes are far from parallel
     for i, v in enumerate(vectors):
         for w in vectors[:i]:
             v.axpy(-v.dot(w), w)
@@ -185,6 +188,7 @@ def strip_dofs(V: fem.FunctionSpace, interface_dofs: NDArray[np.int32]) -> NDArr
     mark.array[interface_dofs] = 1.0
     mark.scatter_forward()
     cells = V.dofmap.list
+    # a cell may touch the crack with a node that another rank owns, and mark nodes of that rank: forward, then back
     layer = cells[np.any(mark.array[cells] > 0.0, axis=1)]
     mark.array[layer.ravel()] = 1.0
     mark.scatter_reverse(la.InsertMode.add)
@@ -245,6 +249,7 @@ class LaggedPC:
             self._inner = _create_pc(self._prefix, *pc.getOperators())
             self._stale = True
         self.fresh = self._stale
+        # PETSc would set the inner one up for every tangent: it is told to keep what it has until it is stale
         if self._stale:
             self._inner.setReusePreconditioner(False)
             self._inner.setUp()
@@ -293,6 +298,7 @@ class StripCycle(LaggedPC):
         if self._strip is None:
             self._is = PETSc.IS().createGeneral(self._dofs + A.getOwnershipRange()[0], comm=A.comm)
             self._B = A.createSubMatrix(self._is, self._is)
+            # a sub-matrix does not inherit this from the matrix
             self._B.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
             self._strip = _create_pc(self._strip_prefix, self._B, self._B)
             self._b, self._c = self._B.createVecs()
