@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from cutsim import read_history
+from cutsim import CheckpointError, read_history
 from cutsim.cases import CaseError, built_in_cases, read_case, run_case, running
 from cutsim.cases.checking import check
 from cutsim.results.output import HistoryWriter
@@ -87,6 +87,9 @@ def test_an_interrupted_run_is_resumed(folder, monkeypatch):
     whole, parts = (read_history(folder / name / "history.csv") for name in ("whole", "parts"))
     for name in ("time", "upper_force", "energy_strain", "front"):
         np.testing.assert_allclose(parts[name], whole[name], rtol=1e-9, err_msg=name)
+    with pytest.raises(CheckpointError, match=r"another case: parameters\.opening = 0\.2 in place of 0\.3"):
+        run_case(short({"parameters.opening": "0.3"}), folder / "parts", COMM, resume=True, quiet=True)
+    assert run_case(short({"output.every": "2"}), folder / "parts", COMM, resume=True, quiet=True).exit_code == 0
 
 
 def test_a_full_disk_leaves_what_was_written(folder, monkeypatch):

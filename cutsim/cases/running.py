@@ -18,6 +18,8 @@ import cutsim
 from cutsim.analysis.stepping import Interrupted, StepError, StepReport
 from cutsim.cases.building import Simulation
 from cutsim.cases.case import Case
+from cutsim.cases.document import places
+from cutsim.cases.keys import dotted
 from cutsim.cases.refusals import refusing
 from cutsim.cases.sizes import mesh_sizes
 from cutsim.results.checkpoints import Checkpoints
@@ -31,6 +33,8 @@ from cutsim.results.stage_recorder import Stages
 CASE = "case.toml"
 #: Picture of the set-up there.
 SETUP = "setup.png"
+# keys that may be changed before a run is resumed: they say how, how far and for whom it is computed
+_FREE = {"title", "steps", "solver", "output", ("analysis", "until")}
 #: Exit codes of ends before the time.
 NO_EQUILIBRIUM, CANNOT_WRITE, INTERRUPTED = 3, 4, 130
 
@@ -95,9 +99,7 @@ def run_case(
     """
     begun, folder = monotonic(), Path(folder)
     simulation = case.build(comm)
-    checkpoints = Checkpoints(
-        folder / CHECKPOINTS, simulation.problem, minutes=every_minutes, case={"title": case.title}
-    )
+    checkpoints = Checkpoints(folder / CHECKPOINTS, simulation.problem, minutes=every_minutes, case=_identity(case))
     time = checkpoints.resume() if resume else None
     if time is None:
         with refusing(case.document, "supports"):
@@ -118,6 +120,12 @@ def run_case(
     except OSError as full:
         error = error or full
     return _outcome(simulation, folder, error)
+
+
+def _identity(case: Case) -> dict[str, Any]:
+    """What a case simulates, by dotted key."""
+    leaves = ((keys, value) for keys, value in places(case.document.tables) if not isinstance(value, dict | list))
+    return {dotted(keys): value for keys, value in leaves if keys[0] not in _FREE and keys not in _FREE}
 
 
 def _seconds(folder: Path) -> float:
