@@ -1,4 +1,4 @@
-"""Loop over steps, the only place that commits.
+"""Loop over steps: each step is tried, accepted or rejected, and committed here and nowhere else.
 
 One step: begin → move tools and loads → solve → (failure: roll back, another line search, then a smaller step) → trial
 history → accept or reject → commit, record.

@@ -1,4 +1,4 @@
-"""Files that are replaced in one go."""
+"""Atomic replacement of files: whoever reads one sees the old or the new content, never half of it."""
 
 import os
 from pathlib import Path

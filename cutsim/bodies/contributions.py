@@ -1,4 +1,4 @@
-"""Contributions to a body beside its elasticity: viscosity, relaxation, energy brought by heat."""
+"""Contributions to the stress and energy of a body besides elasticity: viscosity, relaxation, thermal expansion."""
 
 from collections.abc import Mapping
 

@@ -1,4 +1,4 @@
-"""The mass of bodies: as a form, and as the matrix that makes forces of accelerations."""
+"""Mass of bodies, as a form and as the matrix that turns accelerations into forces."""
 
 from collections.abc import Sequence
 from typing import Literal

@@ -1,4 +1,4 @@
-"""Strain energy evaluated at points, and the strain that belongs to a stress (docs/materials.md)."""
+"""Springs of a viscoelastic solid: energy at points and the strain that belongs to a stress (docs/materials.md)."""
 
 import logging
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Checks of a bond or a contact that make a result questionable: inconsistent parameters, penetrating faces."""
+"""Doubts about a bond or a contact: parameters that do not fit together, and faces that penetrate each other."""
 
 from cutsim.base.verdict import Verdict
 from cutsim.interface.cohesive import CohesiveLaw, process_zone_element

@@ -1,4 +1,4 @@
-"""Displacements prescribed along directions that are no components: axes that nodes have for themselves.
+"""Inclined supports: nodes at which a displacement is prescribed along no component have axes of their own.
 
 At such a node the solver works with the components û = Q u along orthonormal axes, the rows of Q, among which are all
 directions that are held there. Each condition then holds one unknown, as it does elsewhere, and the equations

@@ -1,4 +1,4 @@
-"""Work of an insertion: toughness, parts of the force, and the experiment with two insertions.
+"""Evaluation of the work of an insertion: toughness, parts of the force, and the experiment with two insertions.
 
 All of it starts from the columns of a run of `cutsim.studies.insertion.Insertion` (docs/needle_insertion.md).
 """
