@@ -5,6 +5,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 # files that include each other in a circle are noticed at this depth
 _DEEPEST = 16
 # numbers of nodes and elements are below this
@@ -52,6 +55,16 @@ class Card:
             with self.at():
                 raise ValueError(f"there is no {parameter}=…")
         return self.get(parameter)
+
+    def table(self, columns: int) -> NDArray[np.int64] | None:
+        """Its data, if they are a table of whole numbers with so many columns; in one go, since meshes are large."""
+        if any(text.count(",") != columns - 1 for _, text in self.data):
+            return None
+        try:
+            numbers = np.array(list(map(int, ",".join(text for _, text in self.data).split(","))), dtype=np.int64)
+        except (ValueError, OverflowError):
+            return None
+        return numbers.reshape(-1, columns)
 
     def rows(self) -> Iterator[tuple[int, list[str]]]:
         """Entries of each line of data with the number of the line."""

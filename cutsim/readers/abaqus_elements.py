@@ -100,16 +100,12 @@ class Elements:
     def _free(self, faces: Sequence[Indices]) -> list[Indices]:
         """Those of some faces that belong to one element of the model only."""
         everything = [
-            np.sort(block.nodes[:, corners], axis=1)
+            block.nodes[:, corners]
             for block in self.blocks
             for corners in _FACES.get(block.shape.rstrip("0123456789"), [])
         ]
-        free = []
-        for width in {rows.shape[1] for rows in faces}:
-            some = np.concatenate([rows for rows in faces if rows.shape[1] == width])
-            among = np.concatenate([rows for rows in everything if rows.shape[1] == width])
-            rows = np.concatenate([np.sort(some, axis=1), among])
-            _, which, count = np.unique(rows, axis=0, return_inverse=True, return_counts=True)
-            # each of them is among all faces, too
-            free.append(some[count[which.ravel()[: len(some)]] == 2])
-        return free
+        # faces are the same if the sums of random numbers of their nodes are
+        nodes = 1 + max((int(rows.max(initial=0)) for rows in everything), default=0)
+        random = np.random.default_rng(2).integers(0, 2**62, nodes, dtype=np.uint64)
+        keys, count = np.unique(np.concatenate([random[rows].sum(axis=1) for rows in everything]), return_counts=True)
+        return [rows[count[np.searchsorted(keys, random[rows].sum(axis=1))] == 1] for rows in faces]

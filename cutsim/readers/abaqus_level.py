@@ -188,7 +188,7 @@ class Level:
 
 def _nodes(cards: Sequence[Card]) -> tuple[Indices, Floats]:
     """Numbers of all nodes and their positions, where an instance has moved them; of two with a number the last."""
-    numbers, points = [], []
+    numbers, points = list[int](), list[list[float]]()
     for card in cards:
         if card.keyword != "NODE":
             continue
@@ -232,6 +232,8 @@ def _element_table(card: Card, count: int) -> tuple[list[int], Indices]:
 
     The nodes of an element may go on in further lines.
     """
+    if count and (whole_table := card.table(count + 1)) is not None:
+        return [line for line, _ in card.data], whole_table
     lines, table, row, goes_on = list[int](), list[list[int]](), list[int](), False
     for line, entries in card.rows():
         with card.at(line):

@@ -107,13 +107,14 @@ def _name(element: LinedElement) -> str:
 
 def _numbers(elements: Sequence[LinedElement], width: int, kind: type) -> NDArray[Any]:
     """Rows of numbers, one for each element."""
-    rows: NDArray[Any]
-    try:
-        rows = np.array([(element.text or "").split(",") for element in elements], dtype=str).astype(kind)
-    except (ValueError, OverflowError):
-        rows = np.empty((0, 0), dtype=kind)
-    if rows.shape == (len(elements), width):
-        return rows
+    texts = [element.text or "" for element in elements]
+    if all(text.count(",") == width - 1 for text in texts):
+        try:
+            # in one go, since meshes are large
+            numbers = list(map(int if kind is np.int64 else float, ",".join(texts).split(","))) if texts else []
+            return np.array(numbers, dtype=kind).reshape(-1, width)
+        except (ValueError, OverflowError):
+            pass
     for element in elements:
         _check_row(element, width, kind)
     return np.empty((0, width), dtype=kind)
@@ -142,7 +143,10 @@ def _whole(element: LinedElement, text: str | None) -> int:
 
 
 def _identifiers(elements: Sequence[LinedElement]) -> Indices:
-    return np.array([_whole(element, element.get("id")) for element in elements], dtype=np.int64)
+    try:
+        return np.array([int(element.attrib["id"]) for element in elements], dtype=np.int64)
+    except (KeyError, ValueError, OverflowError):
+        return np.array([_whole(element, element.get("id")) for element in elements], dtype=np.int64)
 
 
 def _listed(element: LinedElement, numbering: Numbering) -> Indices:
