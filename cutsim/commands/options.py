@@ -14,6 +14,7 @@ import typer
 from rich.console import Console
 
 from cutsim.commands import launch
+from cutsim.commands.endings import Ending, say
 
 logger = logging.getLogger("cutsim")
 
@@ -111,4 +112,7 @@ def on_ranks(ranks: int) -> None:
         typer.Exit: The command has ended on its ranks.
     """
     if ranks > 1 and not launch.started():
-        raise typer.Exit(launch.run_on_ranks(["-m", "cutsim", *sys.argv[1:]], ranks))
+        status = launch.run_on_ranks(["-m", "cutsim", *sys.argv[1:]], ranks)
+        if status not in set(Ending):
+            say(f"a rank has crashed or was killed, all have ended (exit status {status})")
+        raise typer.Exit(status if status in set(Ending) else Ending.INTERNAL)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from cutsim.commands.endings import say
 from cutsim.commands.options import Ranks, on_ranks, quiet
 from cutsim.commands.run import end
 
@@ -26,4 +27,6 @@ def command(folder: FolderArgument, ranks: Ranks = 1) -> None:
     from cutsim.cases import read_case, run_case
 
     case = read_case(folder / "case.toml")
-    end(run_case(case, folder, MPI.COMM_WORLD, resume=True, quiet=quiet()))
+    if not any((folder / "checkpoint").glob("*.h5")):
+        say(f"{folder} has no checkpoint: the run begins anew")
+    end(run_case(case, folder, MPI.COMM_WORLD, resume=True, overwrite=True, quiet=quiet()))
