@@ -2,7 +2,7 @@
 #
 # Two soft strips are glued to each other, and their ends stand up like the arms of a T.  Grips pull the arms apart, and
 # the strips peel off each other.  The mesh is drawn here with gmsh.  A file from elsewhere will do as well: `read_mesh`
-# reads `.msh`, `.med`, `.unv` and `.cgns`.
+# reads those of gmsh, Abaqus, FEBio, VTK and others.
 #
 # ## What theory says
 #

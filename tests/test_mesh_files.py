@@ -190,6 +190,21 @@ def test_coincident_nodes_are_kept_apart_or_merged(tmp_path, kind, merge):
         assert not len(np.intersect1d(domain.facets("A|B"), domain.facets("B|A")))
 
 
+def test_meshio_and_read_mesh_agree(tmp_path):
+    """On files that meshio has written in its formats with sets or integers on cells."""
+    points, both = boxes("hex8")
+    cells, parts = [("hexahedron", np.concatenate(both))], [np.array([1, 2])]
+    nodes = {"left": where(points, 0, 0) - 1}
+    own = meshio.Mesh(points, cells, cell_data={"medit:ref": parts}, point_sets=nodes)
+    for name, group in (("a.inp", None), ("b.vtu", "medit:ref 1"), ("c.vtk", "medit:ref 1"), ("d.mesh", "medit:ref 1")):
+        if COMM.rank == 0:
+            own.write(tmp_path / name)
+        domain = read_mesh(COMM.bcast(tmp_path / name), COMM)
+        assert volume(domain.mesh, domain.cells(group or "part1")) == pytest.approx(1 if group else 2)
+        if name == "a.inp":
+            assert area(domain.mesh, domain.facets("left")) == pytest.approx(1)
+
+
 def test_a_body_that_is_split_in_the_file_can_be_cut_where_it_was(tmp_path):
     points, both = boxes("quad4", joined=False)
     text = abaqus("CPE4", points, both).replace("ELSET=B", "ELSET=A")
