@@ -71,7 +71,10 @@ from .results.plots import Curve as Curve
 from .results.plots import plot_curves as plot_curves
 from .results.plots import plot_energy as plot_energy
 from .results.plots import plot_parts as plot_parts
+from .results.presentation import present as present
 from .results.recording import Recording as Recording
+from .results.setup_picture import draw_setup as draw_setup
+from .results.stage_recorder import Stages as Stages
 from .solvers.convergence import Tolerances as Tolerances
 from .studies.body import CrackedBody as CrackedBody
 from .studies.body import cracked_block as cracked_block

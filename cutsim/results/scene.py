@@ -28,6 +28,8 @@ STRESS = "viridis"
 _LINE = "#20242a"
 # part of the picture that the body takes, in the direction in which it is larger
 _FILLED = 0.92
+# width of a picture for which lines and marks are given [pixels]
+_WIDTH = 1600
 # sharp edges are drawn: those at which the surface turns by more than this angle [°]
 _SHARP = 40.0
 
@@ -84,7 +86,7 @@ class Scene:
         if sys.platform == "linux" and not any(map(os.environ.get, ("DISPLAY", "VTK_DEFAULT_OPENGL_WINDOW"))):
             ctypes.CDLL("libEGL.so.1")
             os.environ["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"
-        self._size, self._flat = size, flat
+        self._size, self._flat, self._width = size, flat, size[0] / _WIDTH
         self._plotter = pyvista.Plotter(off_screen=True, window_size=size, lighting="light kit")
         self._plotter.enable_anti_aliasing("ssaa")
 
@@ -101,19 +103,19 @@ class Scene:
         """Add a body coloured by a field, with or without the edges of its cells."""
         self._plotter.add_mesh(
             surface, scalars=scalars, cmap=colours, clim=limits, show_edges=edges, edge_color=_LINE, edge_opacity=0.25,
-            line_width=1, lighting=not self._flat, ambient=0.35, diffuse=0.75, specular=0.1,
+            line_width=self._width, lighting=not self._flat, ambient=0.35, diffuse=0.75, specular=0.1,
             smooth_shading=not self._flat, split_sharp_edges=not self._flat, show_scalar_bar=False, opacity=opacity,
         )  # fmt: skip
 
     def add_lines(self, lines: pyvista.DataSet) -> None:
         """Add edges of a body."""
         if lines.n_cells:
-            self._plotter.add_mesh(lines, color=_LINE, line_width=2, lighting=False)
+            self._plotter.add_mesh(lines, color=_LINE, line_width=2 * self._width, lighting=False)
 
     def add_crack(self, faces: pyvista.DataSet) -> None:
         """Add faces of a crack, coloured by their ``damage``."""
         actor = self._plotter.add_mesh(
-            faces, scalars="damage", cmap=DAMAGE, clim=(0.0, 1.0), line_width=5 if self._flat else 1, lighting=False,
+            faces, scalars="damage", cmap=DAMAGE, clim=(0.0, 1.0), line_width=4 * self._width, lighting=False,
             show_scalar_bar=False,
         )  # fmt: skip
         _bring_forward(actor)
@@ -121,13 +123,13 @@ class Scene:
     def add_faces(self, faces: pyvista.DataSet, colour: Any) -> None:
         """Add faces of a crack in one colour."""
         if faces.n_cells:
-            _bring_forward(self._plotter.add_mesh(faces, color=colour, line_width=5, lighting=False))
+            _bring_forward(self._plotter.add_mesh(faces, color=colour, line_width=5 * self._width, lighting=False))
 
     def add_nodes(self, points: Array, colour: Any, diameter: float) -> None:
-        """Mark some nodes by dots of a diameter [pixels]."""
+        """Mark some nodes by dots of a diameter [pixels in a picture 1600 wide]."""
         if len(points):
             self._plotter.add_points(
-                points, color=colour, point_size=diameter, render_points_as_spheres=True, lighting=False
+                points, color=colour, point_size=diameter * self._width, render_points_as_spheres=True, lighting=False
             )
 
     def add_tool(self, tool: pyvista.PolyData) -> None:

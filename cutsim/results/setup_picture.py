@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 logger = logging.getLogger(__name__)
 
-# diameter of the largest mark of a node [pixels at 200 per inch]; where several are on one node, later ones are smaller
+# diameter of the largest mark of a node [pixels]; where several are on one node, later ones are smaller
 _MARK, _SMALLER = 15.0, 3.0
 _TOOL = "#a3adb8"
 
@@ -94,7 +94,7 @@ class _Setup:
                 scene.add_faces(faces, colour)
                 entries.append(Entry(name, colour, "line" if flat else "area"))
             for index, ((name, nodes), colour) in enumerate(zip(self.marks.items(), colours, strict=True)):
-                scene.add_nodes(nodes, colour, max(_MARK - _SMALLER * index, _SMALLER) * dpi / 200)
+                scene.add_nodes(nodes, colour, max(_MARK - _SMALLER * index, _SMALLER))
                 entries.append(Entry(name, colour, "point"))
             if self.tools is not None:
                 scene.add_tool(self.tools)
