@@ -408,6 +408,7 @@ WRONG = {
     "[steps]": ("[crack]\nfacets = 'crack'\nplus = 'right'\n[steps]", "cracks: not allowed beside .insertion."),
     '"0.002 MPa s"': ("0\nplane = 'strss'", "body.plane: 'strss': must be 'strain' or 'stress'; did you mean 'stress'"),
     "speed =": ("friction = 0.1\nspeed =", "insertion.friction: unknown key, .*; it is a key of .tool."),
+    '"blade"': ('"surfaces"', "tool.shape: 'surfaces': must be one of .*; did you mean 'surface'"),
     "dim = 2": ("dim = 3", "tool.push: .0.0, -1.0.: must have 3 components, as the mesh has dimensions"),
     "notch = 0.5": ("notch = -0.5", "insertion.notch: -0.5: must be a finite number >= 0"),
     "first = 0.02": ("first = 0.02\n[output]\nevery = 0.5\n[steps]", "must be TOML: Cannot declare"),

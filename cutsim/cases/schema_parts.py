@@ -7,6 +7,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from cutsim.base.checks import require
 from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, Viscosity
+from cutsim.cases.classes import classes
 from cutsim.cases.constructed import Constructed, FromTable, With
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyNames, ExistingFile, Group, Groups, Surfaces
@@ -226,7 +227,9 @@ def _tool(value: Any) -> str:
 
 #: A tool of one of the shapes that cutsim exports, or of a surface from a file.
 AnyTool = Annotated[
-    Annotated[SurfaceTool, Tag("<surface>")] | Annotated[Tool, With(Shape), Tag("<shape>")], Discriminator(_tool)
+    Annotated[SurfaceTool, Tag("<surface>")] | Annotated[Tool, With(Shape), Tag("<shape>")],
+    Discriminator(_tool),
+    chosen_by("shape", [*classes(Shape), "surface"]),
 ]
 
 
