@@ -352,9 +352,12 @@ def test_a_sweep_goes_on_where_it_was(bar):
 
 
 def test_a_value_is_fitted(bar):
-    Path("curve.csv").write_text("way [mm],load [N]\n" + "".join(f"{u},{0.75 * u}\n" for u in (0.03, 0.05, 0.06, 0.09)))
+    Path("curve.csv").write_text("way [mm],load [N]\n" + "".join(f"{u},{7.5 * u}\n" for u in (0.03, 0.05, 0.06, 0.09)))
     curve = 'output.curve=["pulled_displacement", "pulled_force"]'
     arguments = ["fit", "bar.toml", "curve.csv", "-o", "fit", "--free", "material.young=1:0.5:3", "--set", curve]
+    plane = runner.invoke(app, arguments)
+    assert plane.exit_code == 2 and "width" in plane.stderr
+    arguments += ["--width", "10"]
     result = runner.invoke(app, arguments)
     assert result.exit_code == 0 and "material.young = 1.5 " in result.stdout, result.output
     assert tomllib.loads(Path("fit/fitted.toml").read_text())["material"]["young"] == pytest.approx(1.5)

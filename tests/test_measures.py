@@ -17,7 +17,7 @@ WIDE = {
     "results.pictures.draw_body": 15,
     "identify.inverse.fit_simulation": 11,
     "bodies.solid.Solid.__init__": 11,
-    "commands.fit.command": 10,
+    "commands.fit.command": 11,
     "commands.fit_material.command": 10,
     "results.recording.Recording.__init__": 13,
     "commands.sweep.command": 10,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from cutsim.commands.options import console
+from cutsim.commands.options import Width, console
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = (
     "cutsim compare results/blade measured.csv",
+    "cutsim compare results/dcb measured.csv -x upper_displacement --width 25",
     "cutsim compare results/fine results/coarse -o compared.pdf",
     'cutsim compare results/blade machine.txt --csv-x "Standard travel:mm" --csv-y "Standard force:kN"',
 )
@@ -28,14 +29,15 @@ EXAMPLES = (
 def command(
     sources: Annotated[list[Path], typer.Argument(metavar="A B…", help="Folders of runs, and files of measurements.")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Plot: png, svg or pdf.")] = Path("compared.png"),
-    x: Annotated[str | None, typer.Option(help="Column of the abscissae of runs; depth or displacement.")] = None,
-    y: Annotated[str | None, typer.Option(help="Column of the ordinates of runs; the force.")] = None,
+    x: Annotated[str | None, typer.Option("-x", "--x", help="Column of runs: abscissae.")] = None,
+    y: Annotated[str | None, typer.Option("-y", "--y", help="Column of runs: ordinates.")] = None,
     csv_x: Annotated[
         str | None, typer.Option(help="Column of the abscissae in files: 'title' or 'title:unit'.")
     ] = None,
     csv_y: Annotated[
         str | None, typer.Option(help="Column of the ordinates in files: 'title' or 'title:unit'.")
     ] = None,
+    width: Width = None,
 ) -> None:
     """Overlay force over displacement of runs and measurements, and list by how much they differ from the first.
 
@@ -44,7 +46,7 @@ def command(
     """
     from cutsim.commands.folders import overlaid, read_sources
 
-    found = read_sources(sources, (x, y), (csv_x, csv_y))
+    found = read_sources(sources, (x, y), (csv_x, csv_y), width)
     table = _differences(found)
     overlaid(found).plot(output)
     screen = console()

@@ -12,7 +12,7 @@ import typer
 
 from cutsim.commands.case_files import CaseArgument, Changes, Quick, case_path, settings
 from cutsim.commands.endings import Ending
-from cutsim.commands.options import Ranks, console, on_ranks
+from cutsim.commands.options import Ranks, Width, console, on_ranks
 
 if TYPE_CHECKING:
     import numpy as np
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from cutsim.analysis.stepping import StepReport
     from cutsim.cases import Case
+    from cutsim.commands.folders import Source
     from cutsim.identify import Fit
 
     Vector = NDArray[np.float64]
@@ -49,6 +50,7 @@ def command(
     quick: Quick = False,
     csv_x: Annotated[str | None, typer.Option(help="Column of the abscissae: 'title' or 'title:unit'.")] = None,
     csv_y: Annotated[str | None, typer.Option(help="Column of the ordinates: 'title' or 'title:unit'.")] = None,
+    width: Width = None,
 ) -> None:
     """Fit values of a case, such as toughness and friction, to a measured curve by many simulations.
 
@@ -59,20 +61,23 @@ def command(
     from mpi4py import MPI
 
     from cutsim.cases import run_case
+    from cutsim.commands.folders import read_source
+    from cutsim.identify import converted
 
     path = case_path(case)
     folder = output or Path("results") / f"{path.stem}-fit"
     wanted = [_Free.of(text) for text in free]
-    forward = Forward(path, tuple(settings(set_ or []).items()), quick)
+    forward = Forward(path, tuple(settings(set_ or []).items()), quick, per_width=width is not None)
     start = forward.case({})
     _keep(folder, start)
     x, y = _measured(data, (csv_x, csv_y), start)
+    y = y if width is None else y / converted(width, "mm", start.units)
     fit = _fitted(forward, {f.key: f.first(start) for f in wanted}, (x, y), wanted, folder / _SIMULATIONS, jobs)
     best = forward.case(fit.values)
     outcome = run_case(best, folder / "fitted", MPI.COMM_WORLD, overwrite=True, quiet=True)
     if MPI.COMM_WORLD.rank == 0:
         (folder / "fitted.toml").write_text(best.text, encoding="utf-8")
-        _show(fit, data, folder, (csv_x, csv_y))
+        _show(fit, read_source(data, csv_x, csv_y, width), folder)
     raise typer.Exit(outcome.exit_code or (Ending.QUESTIONABLE if fit.systematic else Ending.TRUSTED))
 
 
@@ -84,11 +89,13 @@ class Forward:
         path: The case file.
         changes: Other values of the case.
         quick: Whether it is reduced.
+        per_width: Whether forces are to be those per width of a plane case.
     """
 
     path: Path
     changes: tuple[tuple[str, str], ...]
     quick: bool
+    per_width: bool
 
     def case(self, values: Mapping[str, float]) -> Case:
         """The case with some values, in its units.
@@ -113,6 +120,9 @@ class Forward:
         from cutsim.base.checks import require
 
         simulation = self.case(values).build(MPI.COMM_WORLD)
+        state = simulation.problem.state
+        plane = state.mesh.geometry.dim == 2 and not state.axisymmetric
+        require("width", self.per_width, self.per_width == plane, "given for plane cases, and only for those")
         rows: list[tuple[float, ...]] = []
 
         def record(report: StepReport) -> None:
@@ -124,7 +134,7 @@ class Forward:
 
         simulation.run(record)
         where = ", ".join(f"{key} = {value:.5g}" for key, value in values.items())
-        for reason in simulation.problem.state.verdict.reasons:
+        for reason in state.verdict.reasons:
             logger.warning("at %s: %s", where, reason)
         x, y = np.array(rows).T
         return x, y
@@ -216,10 +226,10 @@ def _fitted(
     return fit_simulation(forward, guess, *curve, bounds=bounds, workers=jobs, store=store)
 
 
-def _show(fit: Fit, data: Path, folder: Path, titles: tuple[str | None, str | None]) -> None:
+def _show(fit: Fit, measured: Source, folder: Path) -> None:
     """Print the values, and plot the fitted curve over the measured one."""
     from cutsim.commands.folders import overlaid, read_source
 
-    overlaid([read_source(folder / "fitted"), read_source(data, *titles)]).plot(folder / "fit.png")
+    overlaid([read_source(folder / "fitted"), measured]).plot(folder / "fit.png")
     names = ("fitted.toml", "fit.png", "fitted")
     console().print(str(fit), *(f"written: {folder / name}" for name in names), sep="\n", markup=False)

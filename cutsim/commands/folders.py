@@ -67,7 +67,8 @@ def in_unit(column: Column, unit: str) -> NDArray[np.float64]:
         quantity = pint.get_application_registry().Quantity(column.values, column.unit or "1")
         return np.asarray(quantity.to(unit or "1").magnitude)
     except pint.PintError as error:
-        raise ValueError(f"{column.label} cannot be compared with [{unit or 1}]: {error}") from None
+        hint = "; --width gives the force per width of a plane case" if "/" in unit + column.unit else ""
+        raise ValueError(f"{column.label} cannot be compared with [{unit or 1}]: {error}{hint}") from None
 
 
 def overlaid(sources: Sequence[Source]) -> Overlay:
@@ -107,7 +108,7 @@ def run_column(run: RunFiles, name: str) -> Column:
     return run.history[name]
 
 
-def read_source(path: Path, x: str | None = None, y: str | None = None) -> Source:
+def read_source(path: Path, x: str | None = None, y: str | None = None, width: float | None = None) -> Source:
     """The curve of a run or of a measurement.
 
     Args:
@@ -115,6 +116,7 @@ def read_source(path: Path, x: str | None = None, y: str | None = None) -> Sourc
         x: Column of the abscissae; of a file also "title:unit" where it does not give the unit itself. By default that
             of the main curve, or a displacement.
         y: That of the ordinates; by default that of the main curve, or the force.
+        width: Width of a specimen that was measured, for its force per width [mm].
 
     Raises:
         ValueError: There is no such column, or the file is refused.
@@ -123,15 +125,29 @@ def read_source(path: Path, x: str | None = None, y: str | None = None) -> Sourc
     label = path.resolve().name
     if path.is_file():
         abscissae, ordinates = read_columns(path, {"displacement": x, "force": y})
-        return Source(label, abscissae, ordinates)
+        return Source(label, abscissae, ordinates if width is None else per_width(ordinates, width))
     run = run_files(path)
     main = run.curve or (next(iter(run.history)), list(run.history)[-1])
     abscissae, ordinates = run_column(run, x or main[0]), run_column(run, y or main[1])
     return Source(label, abscissae, ordinates, run.judgement.grade, run.complete)
 
 
+def per_width(force: Column, width: float, length: str = "mm") -> Column:
+    """A force per width, as that of plane problems.
+
+    Args:
+        force: The force.
+        width: The width.
+        length: Its unit.
+    """
+    return replace(force, unit=f"{force.unit}/{length}", values=force.values / width)
+
+
 def read_sources(
-    paths: Sequence[Path], run: tuple[str | None, str | None], file: tuple[str | None, str | None]
+    paths: Sequence[Path],
+    run: tuple[str | None, str | None],
+    file: tuple[str | None, str | None],
+    width: float | None = None,
 ) -> list[Source]:
     """Curves of runs and measurements, by their paths where their names alone would not tell them apart.
 
@@ -139,8 +155,9 @@ def read_sources(
         paths: Folders and files.
         run: Columns of abscissae and ordinates in runs; see `read_source`.
         file: The same in files.
+        width: Width of a specimen that was measured, for its force per width [mm].
     """
-    sources = [read_source(path, *(file if path.is_file() else run)) for path in paths]
+    sources = [read_source(path, *(file if path.is_file() else run), width) for path in paths]
     if len({source.label for source in sources}) < len(sources):
         sources = [source.called(str(path)) for source, path in zip(sources, paths, strict=True)]
     return sources

@@ -18,9 +18,9 @@ EXAMPLES = (
 
 def command(
     folders: Annotated[list[Path], typer.Argument(metavar="DIR…", help="Folders of runs.")],
-    x: Annotated[str | None, typer.Option("-x", help="Column of the abscissae; depth or displacement.")] = None,
+    x: Annotated[str | None, typer.Option("-x", "--x", help="Column of the abscissae; depth or displacement.")] = None,
     y: Annotated[
-        list[str] | None, typer.Option("-y", help="Column of the ordinates, more than once; the force.")
+        list[str] | None, typer.Option("-y", "--y", help="Column of the ordinates, more than once; the force.")
     ] = None,
     output: Annotated[Path, typer.Option("-o", "--output", help="Plot: png, svg or pdf.")] = Path("plot.png"),
     list_columns: Annotated[
