@@ -337,6 +337,32 @@ def test_curved_cells_keep_their_groups(tmp_path, dim):
     assert measure(tagged.mesh, "ds", tagged.facets("rim")) == pytest.approx(2 * np.pi, rel=3e-4)
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("incomplete", [0, 1])
+def test_quadrilaterals_and_hexahedra_of_second_order_are_curved(tmp_path, dim, incomplete):
+    """A quarter of a ring, also with nodes on the edges of its cells only."""
+
+    def draw():
+        geo = gmsh.model.geo
+        centre, *points = [geo.addPoint(*x, 0) for x in ((0, 0), (1, 0), (2, 0), (0, 2), (0, 1))]
+        lines = [geo.addLine(points[0], points[1]), geo.addCircleArc(points[1], centre, points[2])]
+        lines += [geo.addLine(points[2], points[3]), geo.addCircleArc(points[3], centre, points[0])]
+        ring = geo.addPlaneSurface([geo.addCurveLoop(lines)])
+        for line in lines:
+            geo.mesh.setTransfiniteCurve(line, 5)
+        geo.mesh.setTransfiniteSurface(ring)
+        geo.mesh.setRecombine(2, ring)
+        body = [tag for of, tag in geo.extrude([(2, ring)], 0, 0, 1, [2], recombine=True) if of == 3]
+        geo.synchronize()
+        gmsh.model.addPhysicalGroup(dim, body if dim == 3 else [ring], name="ring")
+        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", incomplete)
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.model.mesh.generate(dim)
+
+    tagged = read_mesh(drawn(tmp_path / "ring.msh", draw), COMM, gdim=dim)
+    assert measure(tagged.mesh, "dx", tagged.cells("ring")) == pytest.approx(3 * np.pi / 4, rel=1e-4)
+
+
 CORNERS = [(0, 0), (1, 0), (1, 1), (0, 1)]
 FAN = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
 

@@ -86,7 +86,10 @@ def check_corners(corners: Indices, points: Floats) -> None:
     bad = np.flatnonzero((np.diff(np.sort(corners, axis=1), axis=1) == 0).any(axis=1))
     if len(bad):
         first = place(points[corners[bad[0]]].mean(axis=0))
-        raise ValueError(f"{len(bad)} cells have a node twice, the first at {first}")
+        raise ValueError(
+            f"{len(bad)} cells have a node twice, the first at {first}; cells with fewer corners than their type, such "
+            "as wedges among hexahedra, cannot be used"
+        )
 
 
 def check_nodes(cell: str, degree: int, cells: Indices, points: Floats) -> None:
