@@ -19,7 +19,7 @@ from cutsim.readers.xml_tree import LinedElement
 _RIGID = "rigid body"
 _UNITS = {"mm-N-s": ("mm", "N"), "SI": ("m", "N")}
 #: Elements that FEBio integrates in other ways than ours.
-_OTHER_ELEMENTS = ("ut4-solid", "udg-hex", "sri-solid", "remodelling-solid")
+_OTHER_ELEMENTS = ("ut4-solid", "ut4", "udg-hex", "sri-solid", "remodelling-solid")
 _SPACE = 3
 _QUADRATIC = ("tetra10", "hexahedron20", "hexahedron27", "wedge15")
 #: Sections that the mesh is read from, or that say what is written.

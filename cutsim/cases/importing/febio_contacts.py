@@ -161,6 +161,9 @@ def _reference(context: Context, surface: str, young: Mapping[str, float]) -> fl
 
 
 def _pair(context: Context, element: LinedElement, surfaces: tuple[str, str], young: Mapping[str, float]) -> None:
+    if "node" in element.get("type", "") and not _on(context, element, "two_pass"):
+        what = "points inside of the facets are kept apart here, nodes in FEBio: different if the facets are large"
+        context.draft.difference(element.line, f"{describe(element)}: {what}")
     values = {"slave": surfaces[0], "master": surfaces[1], **_sliding(context, element, surfaces[0], young)}
     context.draft.add("pairs", element.get("name") or "contact", values, f"line {element.line}")
 

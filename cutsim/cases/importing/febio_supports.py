@@ -62,7 +62,11 @@ def nodes_of_set(context: Context, element: LinedElement) -> dict[str, Any]:
     nodes = [context.file.read(child) for child in children(element) if child.tag == "node"]
     if not nodes:
         raise Untranslatable("it names no nodes", element.line)
-    return {"points": context.places(context.rows([context.file.whole(node, "id") for node in nodes], element))}
+    rows = context.rows([context.file.whole(node, "id") for node in nodes], element)
+    rows = rows[np.isin(rows, context.deformable_nodes)]
+    if not len(rows):
+        raise Untranslatable("all its nodes belong to rigid bodies", element.line)
+    return {"points": context.places(rows)}
 
 
 def _translate(context: Context, element: LinedElement) -> None:
