@@ -272,10 +272,12 @@ SLIDING = """<contact name="touch" type="sliding-elastic" surface_pair="pair"><l
 
 def test_rigid_body_becomes_a_tool(tmp_path):
     """A rigid brick that is pressed on the cube is a closed surface with a path, and no part of the mesh."""
-    case, result = imported(
-        tmp_path, material=RIGID, mesh=PAIR, Rigid=PRESSED, Contact=SLIDING.format(laugon="PENALTY")
-    )
+    mesh = PAIR + '<NodeSet name="far">9,10,11,12</NodeSet>'
+    held = '<bc type="zero displacement" node_set="far"><x_dof>1</x_dof></bc>'
+    contact = SLIDING.format(laugon="PENALTY")
+    case, result = imported(tmp_path, material=RIGID, mesh=mesh, Rigid=PRESSED, Contact=contact, Boundary=held)
     assert result.untranslated == () and case["mesh"]["only"] == ["cube"]
+    assert "supports" not in case and "no effect" in result.differences[0]
     tool = case["tools"]["other"]
     assert tool["path"] == {"times": [0, 1], "points": [[0, 0, 0], [0, 0, -0.1]]}
     # 5 E over the height of the element

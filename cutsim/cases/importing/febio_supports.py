@@ -6,7 +6,7 @@ import numpy as np
 
 from cutsim.cases.importing.curves import Timed
 from cutsim.cases.importing.draft import MalformedFile, Untranslatable
-from cutsim.cases.importing.febio_context import AXES, Context
+from cutsim.cases.importing.febio_context import AXES, Context, describe
 from cutsim.cases.importing.febio_file import children
 from cutsim.readers.xml_tree import LinedElement
 
@@ -56,25 +56,34 @@ def nodes_of_set(context: Context, element: LinedElement) -> dict[str, Any]:
     if name:
         if name not in context.mesh.node_sets:
             raise MalformedFile(f"{context.file.place(element)}: there is no node set {name!r}")
-        if context.rigid_parts and not np.isin(context.mesh.node_sets[name], context.deformable_nodes).any():
-            raise Untranslatable("all its nodes belong to rigid bodies", element.line)
         return {"facets" if context.quadratic else "vertices": name}
     nodes = [context.file.read(child) for child in children(element) if child.tag == "node"]
     if not nodes:
         raise Untranslatable("it names no nodes", element.line)
     rows = context.rows([context.file.whole(node, "id") for node in nodes], element)
     rows = rows[np.isin(rows, context.deformable_nodes)]
-    if not len(rows):
-        raise Untranslatable("all its nodes belong to rigid bodies", element.line)
     return {"points": context.places(rows)}
 
 
 def _translate(context: Context, element: LinedElement) -> None:
     values = _values(context, element)
+    if values and _on_rigid_bodies(context, element):
+        context.draft.difference(element.line, f"{describe(element)}: no effect, all its nodes belong to rigid bodies")
+        return
     name = element.get("name") or element.get("node_set") or element.get("set") or f"{element.tag}_{element.get('bc')}"
     comment = f"line {element.line}"
     if values:
         add_supports(context, name, nodes_of_set(context, element), values, comment)
+
+
+def _on_rigid_bodies(context: Context, element: LinedElement) -> bool:
+    """Whether all nodes of a condition belong to rigid bodies, which move as they are told."""
+    name = (element.get("node_set") or element.get("set") or "").strip()
+    nodes = context.mesh.node_sets.get(name)
+    if nodes is None:
+        numbers = [context.file.whole(node, "id") for node in children(element) if node.tag == "node"]
+        nodes = context.rows(numbers, element)
+    return bool(context.rigid_parts) and len(nodes) > 0 and not np.isin(nodes, context.deformable_nodes).any()
 
 
 def _values(context: Context, element: LinedElement) -> dict[int, Timed]:
