@@ -13,7 +13,7 @@ RUN := scripts/run $(if $(RANKS),-n $(RANKS))
 REDUCED := $(if $(filter-out 0,$(QUICK)),--quick)
 LESSON := $(wildcard demos/demo_$(NAME).py)
 PROGRAM := tests/validation/$(NAME).py
-names = $$(ls $(1) | sed -n 's/^$(2)\(.*\)\.py$$/\1/p')
+names = $$(ls $(1) | sed -n '/^_/d; s/^$(2)\(.*\)\.py$$/\1/p')
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-10s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)

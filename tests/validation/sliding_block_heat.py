@@ -52,8 +52,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+import _sliding_heat
 import numpy as np
 import typer
+from _sliding_heat import SOFT_ON_SOFT, STEEL_ON_STEEL, Rubbed, plot_heat, show
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -61,10 +63,8 @@ from scipy.special import erf, k0
 
 from cutsim import (
     ContactHeat,
-    Coulomb,
     HeatBody,
     HeatTransfer,
-    LinearElastic,
     Mechanics,
     PairHeat,
     PenaltyContact,
@@ -98,17 +98,9 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Case:
-    """Block and slab of one material, their contact, and how fast the block slides."""
+class Case(Rubbed):
+    """Block and slab, and how the block slides; '+' of their contact is the block."""
 
-    material: LinearElastic
-    density: float  # [t/mm³]
-    capacity: float  # [mJ/(t K)]
-    conductivity: float  # [mW/(mm K)]
-    friction: Coulomb
-    contact: ContactHeat  # '+' is the block
-    pressure: float  # if uniform [MPa]
-    speed: float  # [mm/s]
     uniform: bool = True  # pressure
     steps: int = 120  # of the slide
     elements: tuple[int, int] = (23, 100)  # along block and slab
@@ -129,25 +121,19 @@ class Case:
         return self.speed * max(time - self.step, 0.0)
 
     @property
-    def stick(self) -> float:
-        """Way for which the faces stick [mm]."""
-        assert self.friction.stiffness is not None
-        return self.friction.mu * self.pressure / self.friction.stiffness
-
-    @property
     def corners(self) -> tuple[float, ...]:
         """Times at which the force has a kink: sliding begins, and slip [s]."""
-        return (self.step, self.step + self.stick / self.speed)
+        return (self.step, self.step + self.elastic_slip / self.speed)
 
     @property
     def control(self) -> StepControl:
         """Steps that grow from the time of sticking."""
-        return StepControl(first=min(self.stick / self.speed, self.step), largest=self.step, growth=2.0, easy=20)
+        return StepControl(first=min(self.elastic_slip / self.speed, self.step), largest=self.step, growth=2.0, easy=20)
 
     @property
     def work(self) -> float:
         """Work of friction of a uniform pressure [mJ/mm]."""
-        return self.friction.mu * self.pressure * (SLIDE - self.stick) * BLOCK
+        return self.friction.mu * self.pressure * (SLIDE - self.elastic_slip) * BLOCK
 
     @property
     def heat_capacities(self) -> Array:
@@ -168,8 +154,7 @@ class Case:
     @property
     def depth(self) -> float:
         """Way of the top of the block that gives the pressure if nothing else gives way [mm]."""
-        confined = self.material.bulk + 4 / 3 * self.material.shear
-        return self.pressure * (HEIGHT / confined + 1 / self.penalty.stiffness)
+        return self.pressure * (HEIGHT / self.confined_modulus + 1 / self.penalty.stiffness)
 
 
 # ## The problem
@@ -363,26 +348,11 @@ def slide(case: Case, name: str, out: Path) -> tuple[Rubbing, dict[str, Array]]:
 
 def balance(case: Case, history: dict[str, Array]) -> dict[str, float]:
     """Heat and work of friction against theory."""
-    last = {name: float(column[-1]) for name, column in history.items()}
-    capacities = case.heat_capacities
-    rises = np.array([last["slab_temperature"], last["block_temperature"], last["interface"]])
-    kept = float(capacities @ rises)
-    closed = {"friction_of_theory": case.work, "mean_rise_of_theory": case.work / float(capacities.sum())}
-    return {
-        "load": last["load"],
-        "friction": last["energy_friction"],
-        "heat_kept": kept,
-        "heat_kept_over_friction": kept / last["energy_friction"],
-        "mean_rise": kept / float(capacities.sum()),
-        **(closed if case.uniform else {}),
-        **{f"{name}_rise": float(rise) for name, rise in zip(("slab", "block", "interface"), rises, strict=True)},
-        "hottest": float(history["temperature_max"].max()),
-        "least_contact_dissipation": float(history["interface_contact_dissipation_min"].min()),
-        "entropy": last["interface_entropy"],
-        "heat_closure": float(np.abs(history["heat_closure"]).max()),
-        "energy_closure": float(np.abs(history["energy_closure"]).max()),
-        "steps": len(history["step"]),
+    closed = {
+        "friction_of_theory": case.work,
+        "mean_rise_of_theory": case.work / float(case.heat_capacities.sum()),
     }
+    return _sliding_heat.balance(history, case.heat_capacities) | (closed if case.uniform else {})
 
 
 def faces(history: dict[str, Array], expected: Theory) -> dict[str, float]:
@@ -447,41 +417,14 @@ def plot(case: Case, history: dict[str, Array], expected: Theory, out: Path, tit
         curves.append(Curve(history["way"][::every], history[name][::every], label, f"C{number}o"))
         curves.append(Curve(history["way"], getattr(expected, name), f"{label}, theory", f"C{number}-"))
     plot_curves(out / "faces.png", curves, xlabel="way [mm]", ylabel="mean temperature [°C]", title=title)
-    columns = {"slab": "slab_temperature", "block": "block_temperature", "interface": "interface"}
-    kept = {
-        name: capacity * history[column]
-        for (name, column), capacity in zip(columns.items(), case.heat_capacities, strict=True)
-        if capacity
-    }
-    curves = [Curve(history["way"], heat, f"heat of the {name}") for name, heat in kept.items()]
-    curves.append(Curve(history["way"], sum(kept.values()), "together"))
-    curves.append(Curve(history["way"], history["energy_friction"], "work of friction", "k--"))
-    plot_curves(out / "heat.png", curves, xlabel="way [mm]", ylabel="heat per width [mJ/mm]", title=title)
+    labels = {"xlabel": "way [mm]", "ylabel": "heat per width [mJ/mm]", "title": title}
+    plot_heat(out / "heat.png", history, case.heat_capacities, "way", **labels)
 
 
 # ## The run
 
-THESIS = Case(
-    material=LinearElastic(5.1, 0.48),
-    density=1e-9,
-    capacity=1e8,
-    conductivity=100.0,
-    friction=Coulomb(0.1, stiffness=0.1),
-    contact=ContactHeat(1000.0, 1000.0, capacity=100.0),
-    pressure=0.1,
-    speed=1.0,
-)
-STEEL = Case(
-    material=LinearElastic(210e3, 0.3),
-    density=7.85e-9,
-    capacity=4.6e8,
-    conductivity=50.0,
-    friction=Coulomb(0.1, stiffness=1e4),
-    contact=ContactHeat(0.2, 0.6),
-    pressure=100.0,
-    speed=10.0,
-    uniform=False,
-)
+THESIS = Case(**SOFT_ON_SOFT)
+STEEL = Case(**STEEL_ON_STEEL, contact=ContactHeat(0.2, 0.6), uniform=False)
 INSULATOR = replace(STEEL, contact=ContactHeat(1e-9, 0.6), uniform=True)
 
 
@@ -525,10 +468,7 @@ def main(
             plot(case, history, expected, out / name, f"Sliding block: {name}")
     write_summary(out / "summary.json", results, COMM)
     if COMM.rank == 0:
-        for name, result in results.items():
-            print(name)
-            for key, value in result.items():
-                print(f"{key:>34} {value:.9g}")
+        show(results)
     check(results)
 
 
