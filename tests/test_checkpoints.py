@@ -224,8 +224,21 @@ def test_a_new_run_removes_the_checkpoints_of_an_older_one(tmp_path):
     mechanics = problem()
     checkpoints = Checkpoints(tmp_path / "checkpoint", mechanics)
     with Recording(tmp_path, mechanics, 1.0, every=0, overwrite=True, checkpoints=checkpoints):
-        assert step_of(tmp_path) == 0
-    assert [path.name for path in (tmp_path / "checkpoint").iterdir()] == ["step-000000.h5"]
+        assert [path.name for path in (tmp_path / "checkpoint").iterdir()] == ["step-000000.h5"]
+
+
+def test_a_run_that_is_killed_before_its_first_minutes_are_over_begins_anew(tmp_path):
+    def begin():
+        mechanics = problem()
+        checkpoints = Checkpoints(tmp_path / "checkpoint", mechanics)
+        checkpoints.resume()
+        return mechanics, Recording(tmp_path, mechanics, 1.0, every=0, checkpoints=checkpoints)
+
+    mechanics, recording = begin()
+    run(mechanics, 2 * STEP, StepControl.fixed(STEP), recording)
+    mechanics, recording = begin()
+    run(mechanics, STEP, StepControl.fixed(STEP), recording)
+    assert read_history(tmp_path / "history.csv")["step"].tolist() == [1]
 
 
 def test_a_restored_problem_may_be_recorded_elsewhere(tmp_path):
@@ -283,7 +296,7 @@ def test_what_no_file_can_hold_is_refused_by_name(value, words, folder):
 
 def test_the_file_of_another_version_is_refused(tmp_path):
     go(tmp_path, 1)
-    (path,) = (tmp_path / "checkpoint").iterdir()
+    path = tmp_path / "checkpoint" / "step-000001.h5"
     with h5py.File(path, "r+") as file:
         head = json.loads(file["header"].asstr()[()])
         file["header"][()] = json.dumps(head | {"format": 99})

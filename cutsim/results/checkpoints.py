@@ -93,9 +93,14 @@ class Checkpoints:
         """Whether it is time to, on the clock of the first rank."""
         return bool(self._comm.bcast(monotonic() - self._last >= self._seconds))
 
-    def clear(self) -> None:
-        """Remove checkpoints of older runs from the folder."""
+    def begin(self) -> None:
+        """Remove checkpoints of older runs from the folder, and write a first one: also a young run can be resumed.
+
+        Raises:
+            OSError: It cannot be written, on all ranks.
+        """
         on_root(self._comm, lambda: self._keep(self._files))
+        self.save()
 
     def __call__(self, report: StepReport) -> None:
         """Write a checkpoint if it is time to."""

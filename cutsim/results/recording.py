@@ -105,12 +105,12 @@ class Recording:
         resumed: bool = name in memory.awaited and comm.bcast((self.folder / HISTORY).exists())
         if not resumed:
             claim_folder(self.folder, comm, overwrite=overwrite, subfolders=False)
-        if not resumed and self._checkpoints is not None:
-            self._checkpoints.clear()
         self._written = memory.value(name, _Written())
         if not resumed:
             # the rows in another folder count from there
             self._written.set(_Written())
+        if not resumed and self._checkpoints is not None:
+            self._checkpoints.begin()
         return resumed
 
     def _older(self) -> dict[str, list[float]]:
