@@ -302,6 +302,7 @@ def test_tables_for_a_first_try(written):
         ("title.x", "3", "title: {x}: must be a text in quotes"),
         ("mesh", "3", "mesh: 3: must be a table"),
         ("a..b", "1", "a: unknown key"),
+        ("material.0.1", "edge", "material.0: unknown key"),
         ("", "1", "unknown key"),
         ("tool.push.7", "1", "tool.push: {7}: must be a list in brackets"),
         ("tools.blade.shape", "ball", "tools.blade.radius: missing"),

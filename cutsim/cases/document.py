@@ -204,10 +204,15 @@ def _merged(first: Any, second: Any) -> Any:
     if isinstance(first, list) and isinstance(second, Mapping) and second.keys() <= set(range(len(first))):
         return [_merged(entry, second[i]) if i in second else entry for i, entry in enumerate(first)]
     if not isinstance(first, Mapping) or not isinstance(second, Mapping):
-        return second
+        return _named(second)
     if any(key in second and first.get(key) != second[key] for key in _KINDS):
-        return dict(second)
-    return {**first, **{key: _merged(first[key], value) if key in first else value for key, value in second.items()}}
+        return _named(second)
+    return {**first, **{str(key): _merged(first.get(str(key)), value) for key, value in second.items()}}
+
+
+def _named(value: Any) -> Any:
+    """A value in which keys of tables are texts, also those that could be numbers of entries."""
+    return {str(key): _named(entry) for key, entry in value.items()} if isinstance(value, Mapping) else value
 
 
 def unfolded(tables: Mapping[str, Any], source: File | Setting) -> Document:
