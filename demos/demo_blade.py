@@ -93,7 +93,7 @@ result = {
     "largest_imbalance": history["imbalance"][way > start].max(),
 }
 recording.summary(result)
-draw_insertion("results/blade/cut.png", cut, mirror=("z",), window=(-7.0, 7.0, -4.4, 1.5, -5.5, 5.5))
+draw_insertion("results/blade/cut.png", cut, mirror=("z",))
 if MPI.COMM_WORLD.rank == 0:
     print(*(f"{name}: {value:.5g}" for name, value in result.items()), sep="\n")
     labels = dict(xlabel="depth of the tip [mm]", ylabel="force [N]", title="Blade cutting of silicone")

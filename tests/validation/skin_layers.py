@@ -187,19 +187,19 @@ def draw(cut: Insertion, history: History, out: Path) -> None:
     block, space = cut.body, fem.functionspace(cut.body.state.mesh, ("DG", 0))
     number, stress = fem.Function(space), VonMises(block.solids)()
     stress.x.array[:] *= 1e3
-    for i, solid in enumerate(block.solids, start=1):
+    for i, solid in enumerate(block.solids):
         number.x.array[space.dofmap.list[solid.cells, 0]] = i
     grid = gather_grid(block.state.u, {"layer": number, "stress": stress})
-    labels = {"layer": "layer, from the surface downwards", "stress": "von Mises stress [kPa]"}
-    for field, label in labels.items():
+    layers = [layer.name.replace("_", " ") for layer in block.layers]
+    for field, names in {"layer": layers, "stress": []}.items():
         draw_body(
             out / f"{field}.png",
             grid,
             field,
-            label=label,
+            label="von Mises stress [kPa]",
+            names=names,
             tool=tool_surface(cut),
             window=(-0.9, 0.9, -cut.depth - 0.3, 0.3, 0.0, 0.0),
-            limits=(0.0, len(block.layers)) if field == "layer" else None,
         )
 
 
