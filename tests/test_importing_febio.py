@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from cutsim.cases import import_model, read_case
 from cutsim.materials.anisotropic import FungOrthotropic
+from helpers.materials import stress
 
 CUBE = """<Nodes name="o">
 <node id="1">0,0,0</node><node id="2">1,0,0</node><node id="3">1,1,0</node><node id="4">0,1,0</node>
@@ -406,3 +407,64 @@ def test_other_files(tmp_path):
     """The name says the format."""
     with pytest.raises(ValueError, match=r"\(\.feb\) or Abaqus \(\.inp\)"):
         import_model(tmp_path / "model.stl")
+
+
+# -- stresses as FEBio computes them ----------------------------------------------------------------------------------
+
+
+def deviator(stress):
+    return stress - np.trace(stress) / 3 * np.eye(3)
+
+
+def holzapfel_stress(F, c=1.0, k1=2.0, k2=3.0, kappa=0.1, gamma=30.0):
+    """Deviatoric Cauchy stress times J by FEBio's manual: c b̄ + Σ 2 k₁ E exp(k₂E²) h, h = κ b̄ + (1 − 3κ) a ⊗ a."""
+    bar = F / np.cbrt(np.linalg.det(F))
+    b, total = bar @ bar.T, 0.0
+    for sign in (1, -1):
+        a = bar @ [np.cos(np.radians(gamma)), sign * np.sin(np.radians(gamma)), 0.0]
+        strain = max(kappa * (np.trace(b) - 3) + (1 - 3 * kappa) * (a @ a - 1), 0.0)
+        total = total + 2 * k1 * strain * np.exp(k2 * strain**2) * (kappa * b + (1 - 3 * kappa) * np.outer(a, a))
+    return deviator(c * b + total)
+
+
+def fung_stress(F, E=(1.0, 2.0, 3.0), G=(4.0, 5.0, 6.0), v=(0.1, 0.2, 0.3), c=7.0):
+    """The same for Fung's solid: W = c/2 (exp(Q/c) − 1), Q = Σ 2 μₐ A:E² + Σ λₐᵦ (A:E)(B:E)."""
+    mu = np.array([G[0] + G[2] - G[1], G[0] - G[2] + G[1], -G[0] + G[2] + G[1]])
+    compliance = np.diag([1 / e for e in E])
+    for i, j, value in ((0, 1, v[0] / E[0]), (1, 2, v[1] / E[1]), (0, 2, v[2] / E[2])):
+        compliance[i, j] = compliance[j, i] = -value
+    lame = np.linalg.inv(compliance) - 2 * np.diag(mu)
+    bar = F / np.cbrt(np.linalg.det(F))
+    strain = 0.5 * (bar.T @ bar - np.eye(3))
+    normal, dQ = np.diag(strain), np.zeros((3, 3))
+    Q = 2 * mu @ np.diag(strain @ strain) + normal @ lame @ normal
+    for i in range(3):
+        A = np.outer(np.eye(3)[i], np.eye(3)[i])
+        dQ += 2 * mu[i] * (A @ strain + strain @ A) + 2 * (lame @ normal)[i] * A
+    return deviator(bar @ (0.5 * np.exp(Q / c) * dQ) @ bar.T)
+
+
+STRESSES = {
+    "Holzapfel-Gasser-Ogden": (
+        "<c>1</c><k1>2</k1><k2>3</k2><kappa>0.1</kappa><gamma>30</gamma>", holzapfel_stress,
+    ),
+    "Fung orthotropic": (
+        "<E1>1</E1><E2>2</E2><E3>3</E3><G12>4</G12><G23>5</G23><G31>6</G31><v12>0.1</v12><v23>0.2</v23><v31>0.3</v31>"
+        "<c>7</c>", fung_stress,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", STRESSES)
+def test_stress_of_anisotropic_materials(kind, tmp_path):
+    """The deviatoric stress of the material in the case is that of FEBio's formulas, in shear and stretch."""
+    constants, formula = STRESSES[kind]
+    case = read_case(
+        write_case(
+            imported(tmp_path, material=of_type(kind, constants + UNCOUPLED), Boundary=CONDITIONS["4.0"][0])[1],
+            tmp_path,
+        )
+    )
+    F = np.array([[1.2, 0.3, -0.1], [0.05, 0.9, 0.2], [0.1, -0.15, 1.1]])
+    cauchy = stress(case.bodies["cube"].material, F) @ F.T
+    np.testing.assert_allclose(deviator(cauchy), formula(F), rtol=1e-9, atol=1e-12)
