@@ -40,6 +40,8 @@ _NEUTRAL: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 #: Penetration that is allowed where FEBio has no tolerance of the gap, as a fraction of a facet.
 _PENETRATION = 0.01
+#: Least penalty of a contact that is augmented, in Young's modulus over the height of an element.
+_AUGMENTED = 10.0
 #: Stiffness of what is tied without a tolerance, in Young's modulus over the height of an element.
 _STIFF = 100.0
 
@@ -140,6 +142,9 @@ def _sliding(context: Context, element: LinedElement, surface: str, young: Mappi
     values: dict[str, Any] = {"contact": {"stiffness": rounded(penalty)}}
     gap = file.number(element, "gaptol", 0.0)
     if _on(context, element, "laugon"):
+        # where FEBio augments, its penalty is no part of the result
+        penalty = max(penalty, _AUGMENTED * _reference(context, surface, young))
+        values["contact"] = {"stiffness": rounded(penalty)}
         values["allowed_penetration"] = gap or rounded(_PENETRATION * mean_size(context.mesh, surface))
     friction, stiffness = file.number(element, "fric_coeff", 0.0), file.number(element, "fric_penalty", 0.0)
     if friction:
