@@ -15,6 +15,7 @@ from cutsim.cases.scope import Scope
 _KINDS = ("model", "shape", "kind")
 _FORMS = {"<single>": "a text or a number", "<list>": "a list in brackets", "<table>": "a table"}
 _WORDS = {
+    "int_parsing_size": "must be a smaller number",
     "path_type": "must be a text in quotes",
     "string_type": "must be a text in quotes",
     "bool_type": "must be true or false",
