@@ -55,7 +55,7 @@ def bad_values(where, hint):
     allowed = kinds(hint)
     if "_NestedSequence" in str(hint):  # numpy's ArrayLike, which newer versions do not spell out
         allowed = [k for k in allowed if "numpy" not in str(k) and k not in (bool, int, float, complex, str, bytes)]
-    values = {"text": "x", "list": [], "complex": 1j, "object": object(), "nan": float("nan"), "-inf": -INF}
+    values = {"text": "text", "list": [], "complex": 1j, "object": object(), "nan": float("nan"), "-inf": -INF}
     if where not in ENDLESS:
         values["inf"] = INF
     if type(None) not in allowed:

@@ -3,6 +3,7 @@
 import logging
 from pathlib import Path
 
+from cutsim.base.signatures import checked
 from cutsim.results.animation import animate, draw_stages
 from cutsim.results.overlay import Overlay
 from cutsim.results.plots import plot_energy
@@ -12,6 +13,7 @@ from cutsim.results.run_files import RunFiles
 logger = logging.getLogger(__name__)
 
 
+@checked
 def present(folder: Path | str, *, animation: bool = True) -> Path:
     """Draw what a run has left in its folder, and write its report. Call it on one rank.
 

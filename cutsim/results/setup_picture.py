@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from cutsim.analysis.stepping import Problem
 from cutsim.base.arrays import Array
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Bonded, Joining, offering
 from cutsim.base.units import Units
 from cutsim.bodies.loads import NodalForce, Support, SurfaceLoad
@@ -40,6 +41,7 @@ _MARK, _SMALLER = 15.0, 3.0
 _TOOL = "#a3adb8"
 
 
+@checked
 def draw_setup(
     path: Path | str, problem: Problem, supports: Sequence[Support], units: Units | None = None, title: str = ""
 ) -> None:

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
-from cutsim.base.checks import count, require, require_number
+from cutsim.base.checks import count, finite, require, require_number
+from cutsim.base.signatures import checked
 from cutsim.base.terms import Bonded, FacetShowing, offering
 from cutsim.base.units import Units
 from cutsim.bodies.solid import Solid
@@ -51,6 +52,7 @@ class Stages(Closing):
         ValueError: A plane of symmetry is unknown.
     """
 
+    @checked
     def __init__(
         self,
         folder: Path | str,
@@ -62,6 +64,7 @@ class Stages(Closing):
         mirror: Sequence[str] = (),
     ) -> None:
         require_number("number", number, count(1))
+        require_number("until", until, finite)
         for plane in mirror:
             require("mirror", plane, plane in ("x", "y", "z"), "x, y or z")
         self._folder, self._until, self._number = Path(folder) / FOLDER, until, number
