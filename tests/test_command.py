@@ -240,7 +240,7 @@ def test_compare_measures_over_the_common_range(tmp_path, monkeypatch):
     Path("machine.txt").write_text("made by us\nt;Weg;Kraft\ns;m;kN\n0;0,000;0,000\n1;0,002;0,005\n2;0,006;0,015\n")
     result = runner.invoke(app, ["compare", whole, short, "machine.txt"])
     assert result.exit_code == 0, result.output
-    assert "from 0 to 2" in result.stdout
+    assert "depth [mm] from 0 to 2" in result.stdout
     assert cells(result, "whole") == ["whole", "trusted", "4", "4"]
     assert cells(result, "short")[1:] == ["interrupted", "6", "+50.00%", "6", "+50.00%", "1.15", "28.87%"]
     assert cells(result, "machine.txt")[1:6] == ["measured", "5", "+25.00%", "5", "+25.00%"]

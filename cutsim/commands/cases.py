@@ -6,9 +6,8 @@ import json
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
-from cutsim.commands.options import console
+from cutsim.commands.options import console, table
 
 EXAMPLES = (
     "cutsim cases",
@@ -29,7 +28,5 @@ def command(
     if schema:
         print(json.dumps(case_schema(), indent=1, ensure_ascii=False))
         return
-    table = Table("name", "what it shows", box=None, header_style="bold")
-    for name, (title, _) in built_in_cases().items():
-        table.add_row(name, title)
-    console().print(table)
+    rows = [(name, title) for name, (title, _) in built_in_cases().items()]
+    console().print(table(("name", "what it shows"), rows))

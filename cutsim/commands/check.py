@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from cutsim.commands.case_files import CaseArgument, Changes, Quick, case_path, settings
 from cutsim.commands.endings import Ending
-from cutsim.commands.options import console
+from cutsim.commands.options import console, table
 
 EXAMPLES = ("cutsim check blade --quick", "cutsim check mine.toml --set parameters.edge=0.1 -o setup.png")
 
@@ -33,11 +32,10 @@ def command(
     path = case_path(case)
     simulation = read_case(path, settings(set_ or []), quick=quick).build(MPI.COMM_SELF)
     found = check(simulation)
-    table = Table("about", "what", "found", box=None, header_style="bold")
-    for row in found.rows:
-        table.add_row(row.topic, row.what, row.value)
     screen = console()
-    screen.print(table, *(f"against it: {doubt}" for doubt in found.doubts), sep="\n")
+    screen.print(table(("about", "what", "found"), [(row.topic, row.what, row.value) for row in found.rows]))
+    for doubt in found.doubts:
+        screen.print(f"against it: {doubt}", markup=False)
     picture = output or Path(f"{path.stem}-setup.png")
     simulation.draw(picture)
     screen.print(f"written: {picture}", markup=False)

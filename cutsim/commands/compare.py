@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
-from cutsim.commands.options import Width, console
+from cutsim.commands.options import Width, console, table
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+    from rich.table import Table
 
     from cutsim.commands.folders import Source
 
@@ -47,23 +47,22 @@ def command(
     from cutsim.commands.folders import overlaid, read_sources
 
     found = read_sources(sources, (x, y), (csv_x, csv_y), width)
-    table = _differences(found)
+    x_range, differences = _differences(found)
     overlaid(found).plot(output)
     screen = console()
-    screen.print(table)
-    screen.print(f"written: {output}", markup=False)
+    screen.print(differences)
+    screen.print(f"{x_range}; each beside the first", f"written: {output}", sep="\n", markup=False)
 
 
-def _differences(sources: list[Source]) -> Table:
-    """Peak, work and difference of each curve over the range that they have in common."""
+def _differences(sources: list[Source]) -> tuple[str, Table]:
+    """The range that all curves have in common, in words, and peak, work and difference of each over it."""
     import numpy as np
 
     first = sources[0]
     x, curves = _sampled(sources)
-    unit, work = first.y.unit or "1", f"{first.y.unit}·{first.x.unit}".strip("·") or "1"
-    table = Table("curve", "verdict", f"peak [{unit}]", "", f"work [{work}]", "", f"rms [{unit}]", "", box=None)
-    table.caption = f"{first.x.label} from {x[0]:.4g} to {x[-1]:.4g}; each beside the first"
-    table.caption_justify, table.header_style = "left", "bold"
+    unit = first.y.unit or "1"
+    work = "·".join(f"({u})" if "/" in u else u for u in (first.y.unit, first.x.unit) if u) or "1"
+    rows = []
     for source, y in zip(sources, curves, strict=True):
         off = y - curves[0]  # linear between the abscissae
         squares = (off[1:] ** 2 + off[1:] * off[:-1] + off[:-1] ** 2) / 3
@@ -71,8 +70,9 @@ def _differences(sources: list[Source]) -> Table:
         cells = [source.label, source.grade]
         for value, base in ((y.max(), curves[0].max()), (np.trapezoid(y, x), np.trapezoid(curves[0], x))):
             cells += [f"{value:.5g}", f"{value / base - 1:+.2%}" if base and source is not first else ""]
-        table.add_row(*cells, *([f"{rms:.3g}", f"{rms / curves[0].max():.2%}"] if source is not first else ["", ""]))
-    return table
+        rows.append([*cells, *([f"{rms:.3g}", f"{rms / curves[0].max():.2%}"] if source is not first else ["", ""])])
+    header = ("curve", "verdict", f"peak [{unit}]", "", f"work [{work}]", "", f"rms [{unit}]", "")
+    return f"{first.x.label} from {x[0]:.4g} to {x[-1]:.4g}", table(header, rows)
 
 
 def _sampled(sources: list[Source]) -> tuple[Numbers, list[Numbers]]:

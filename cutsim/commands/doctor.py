@@ -14,12 +14,11 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.table import Table
 
 import cutsim
 from cutsim.commands import launch
 from cutsim.commands.endings import Ending
-from cutsim.commands.options import console
+from cutsim.commands.options import console, table
 
 EXAMPLES = ("cutsim doctor", "cutsim doctor --no-test")
 _DISTRIBUTIONS = ("numpy", "scipy", "gmsh", "meshio", "pyvista", "h5py", "matplotlib", "plotly", "imageio-ffmpeg")
@@ -42,10 +41,7 @@ def command(
 ) -> None:
     """Show what is installed, and solve a problem whose answer is known on one rank and on two."""
     screen = console()
-    table = Table("what", "found", box=None, header_style="bold")
-    for name, words in {**_python(), **_libraries(), **_machine()}.items():
-        table.add_row(name, words)
-    screen.print(table)
+    screen.print(table(("what", "found"), list({**_python(), **_libraries(), **_machine()}.items())))
     if not test:
         return
     screen.print("\nTwo blocks that are glued are pulled apart:")

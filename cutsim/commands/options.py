@@ -5,13 +5,16 @@ from __future__ import annotations
 import inspect
 import logging
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
 from inspect import Parameter
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+from rich.text import Text
 
 from cutsim.commands import launch
 from cutsim.commands.endings import Ending, say
@@ -104,6 +107,19 @@ def console() -> Console:
     if not screen.is_terminal:
         screen.width = 10_000
     return screen
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """A table to be printed as it is, units in brackets too.
+
+    Args:
+        header: Heads of the columns.
+        rows: Cells of each row.
+    """
+    found = Table(*map(escape, header), box=None, header_style="bold")
+    for row in rows:
+        found.add_row(*map(Text, row))
+    return found
 
 
 def on_ranks(ranks: int) -> None:

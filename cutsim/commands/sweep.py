@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
 from cutsim.commands.case_files import CaseArgument, Changes, Quick, case_path, settings
 from cutsim.commands.endings import Ending
 from cutsim.commands.jobs import Job, Runner
-from cutsim.commands.options import Overwrite, Ranks, console
+from cutsim.commands.options import Overwrite, Ranks, console, table
 from cutsim.commands.sweep_runs import Statuses, SweepRun, described, write_table
 from cutsim.commands.variation import Variant, Variation, variants
 
@@ -123,10 +122,7 @@ def _report(folder: Path, runs: Sequence[SweepRun], statuses: Statuses, screen: 
     rows = write_table(folder / "sweep.csv", runs, statuses)
     largest = dict.fromkeys(name for row in rows for name in row if name.startswith("largest_"))
     shown = [*runs[0].variant.values, "ended", *largest]
-    table = Table(*shown, box=None, header_style="bold")
-    for row in rows:
-        table.add_row(*(row.get(name, "") for name in shown))
-    screen.print(table)
+    screen.print(table(shown, [[row.get(name, "") for name in shown] for row in rows]))
     written = [folder / "sweep.csv"]
     if sources := [read_source(run.folder) for run in runs if run.begun]:
         overlaid(sources).plot(folder / "sweep.png")
