@@ -6,6 +6,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+from cutsim.results import report
 from cutsim.results.presentation import plot_run, present
 from cutsim.results.report import write_report, write_sweep_report
 from cutsim.results.run_files import RunFiles
@@ -104,6 +105,20 @@ def test_report_of_nothing_names_what_is_missing(tmp_path):
         words = Page(write_report(tmp_path)).text
         assert "summary.json cannot be read" in words and "there is no curve" in words
         assert plot_run(RunFiles.read(tmp_path)) == []
+
+
+@pytest.mark.parametrize("odd", [None, 1, "x", True, [[1], 2], {"a": None}], ids=str)
+def test_report_is_written_whatever_a_summary_holds(tmp_path, odd, monkeypatch):
+    monkeypatch.setattr(report, "get_plotlyjs", lambda: "")
+    write_run(tmp_path, verdict="trusted")
+    (tmp_path / "case.toml").write_text("units = 3\nlayers = [{name = 'a'}, {name = 'b'}]\n")
+    whole = json.loads((tmp_path / "summary.json").read_text())
+    for name in ("verdict", "reasons", "time", "until", "versions", "ranks", "wall_time", "mesh", "curve", "other"):
+        (tmp_path / "summary.json").write_text(json.dumps(whole | {name: odd}))
+        write_sweep_report(tmp_path / "sweep", {tmp_path: {"a": 1}})
+        assert "largest force 3 N" in Page(write_report(tmp_path)).text
+    (tmp_path / "summary.json").write_text(json.dumps(odd))
+    assert ("summary.json cannot be read" in Page(write_report(tmp_path)).text) != isinstance(odd, dict)
 
 
 def test_report_of_a_sweep_has_a_row_and_a_curve_for_each_run(tmp_path):

@@ -19,6 +19,11 @@ _ABSCISSAE = ("depth", "way", "opening", "deflection", "time")
 _ORDINATES = ("force", "load")
 # columns of the energy audit that it adds up
 _AUDIT = tuple(f"energy_{entry}" for entry in ENTRIES)
+# types of the entries of a summary that are looked at
+_TYPES: Mapping[str, Any] = {
+    "verdict": str, "reasons": list, "time": int | float, "until": int | float, "wall_time": int | float, "ranks": int,
+    "curve": list, "mesh": dict, "versions": dict,
+}  # fmt: skip
 # how a reason against a run begins that has not come to its end
 _INTERRUPTED = "interrupted at time"
 # part of the time of a run by which it may miss its end
@@ -110,6 +115,12 @@ class RunFiles:
             return {}
 
     @property
+    def units(self) -> Mapping[str, Any]:
+        """Table of the case with its units."""
+        units = self.tables.get("units")
+        return units if isinstance(units, Mapping) else {}
+
+    @property
     def steps(self) -> int:
         """Steps in the history."""
         return len(next(iter(self.history.values())).values) if self.history else 0
@@ -154,7 +165,7 @@ class RunFiles:
         """
         if not self.steps:
             return None
-        given = self.summary.get("curve") or (None, None)
+        given = [str(name) for name in self.summary.get("curve", ())] + ["", ""]
         x = next((name for name in (given[0], *_ABSCISSAE) if name in self.history), None)
         forces = [name for name in self.history if name.endswith(("_force", "_reaction")) or "_force_" in name]
         y = next((name for name in (given[1], *_ORDINATES, *forces) if name in self.history), None)
@@ -176,7 +187,11 @@ class RunFiles:
 
 
 def _summary(path: Path) -> Mapping[str, Any]:
-    return dict(json.loads(path.read_text(encoding="utf-8")))
+    """Entries of a summary; those of another type than they are written with are left out."""
+    entries = json.loads(path.read_text(encoding="utf-8"))
+    if not isinstance(entries, dict):
+        raise ValueError("it is no table of names and values")
+    return {name: value for name, value in entries.items() if isinstance(value, _TYPES.get(name, object))}
 
 
 def _history(path: Path) -> Mapping[str, Column]:
