@@ -58,8 +58,8 @@ def things():
 #: Values of parameters by name, where the kind does not say enough; "@" stands for one of the `things`.
 NAMED = {
     "direction": (0.0, 1.0), "entities": "@entities", "facets": "@facets", "master_facets": "@master_facets",
-    "plus": "@plus", "poisson": 0.3, "slave_facets": "@slave_facets", "supports": [], "surfaces": ["@surface"], "terms": ["@solid"],
-    "tools": ["@tool"], "vertices": "@vertices", "x": LINE, "xlabel": "x", "y": LINE, "ylabel": "y",
+    "plus": "@plus", "poisson": 0.3, "slave_facets": "@slave_facets", "supports": [], "surfaces": ["@surface"],
+    "terms": ["@solid"], "tools": ["@tool"], "vertices": "@vertices", "x": LINE, "xlabel": "x", "y": LINE, "ylabel": "y",
     "curves": [cutsim.Curve(LINE, LINE)], "history": {}, "parts": {"part": LINE}, "path": "file.msh",
     "position": lambda t: np.zeros(2), "solids": "@solid", "total": LINE,
 }  # fmt: skip
