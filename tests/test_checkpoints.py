@@ -364,7 +364,7 @@ def test_a_killed_run_goes_on(ranks, tmp_path):
     """Killed in the middle of a write, and at a random moment: nothing but the last step is lost."""
     script = str(Path(__file__).with_name("resumed_run.py"))
     command = [str(mpirun()), "-n", str(ranks)] if ranks > 1 else []
-    command += [sys.executable, script, "run", str(tmp_path / "killed"), "--die", "8"]
+    command += [sys.executable, script, "run", str(tmp_path / "killed"), "--die", "7"]
     for _ in range(2):
         found = step_of(tmp_path / "killed")
         assert subprocess.run(command, env=environment(), timeout=120, capture_output=True).returncode != 0
