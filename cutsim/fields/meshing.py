@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import basix
 import basix.ufl
 import numpy as np
 from dolfinx.mesh import Mesh, MeshTags, entities_to_geometry, locate_entities, meshtags
@@ -279,27 +280,18 @@ def _distributed(model: Model | None, comm: MPI.Comm) -> TaggedMesh:
     cells = np.empty((0, nodes), dtype=np.int64) if model is None else model.cells
     mesh = create_mesh(comm, cells, np.empty((0, gdim)) if model is None else model.points, element)
     check_cells(mesh)
-    tdim, original = mesh.topology.dim, mesh.topology.original_cell_index
-    numbers = {dim: _corners(mesh, dim) for dim in (0, tdim - 1)}
-
-    def local(dim: int, rows: NDArray[np.int64]) -> NDArray[np.int32]:
-        if dim == tdim:
-            return np.flatnonzero(np.isin(original, rows)).astype(np.int32)
-        return _entities(numbers[dim], rows.reshape(-1, dim * 0 + numbers[dim].shape[1]))
-
-    return _tagged(mesh, {group: local(group[0], rows) for group, rows in groups.items()})
+    tdim = mesh.topology.dim
+    numbers = {dim: _corners(mesh, dim) for dim in (0, tdim - 1)} | {tdim: mesh.topology.original_cell_index[:, None]}
+    return _tagged(mesh, {(dim, name): _entities(numbers[dim], rows) for (dim, name), rows in groups.items()})
 
 
 def _corners(mesh: Mesh, dim: int) -> NDArray[np.int64]:
     """Corners of all local vertices or facets, in the numbers of the nodes as they were read."""
-    tdim = mesh.topology.dim
     mesh.topology.create_entities(dim)
-    mesh.topology.create_connectivity(dim, tdim)
+    mesh.topology.create_connectivity(dim, mesh.topology.dim)
     index_map = mesh.topology.index_map(dim)
     entities = np.arange(index_map.size_local + index_map.num_ghosts, dtype=np.int32)
-    corners = (
-        {"triangle": 2, "quadrilateral": 2, "tetrahedron": 3, "hexahedron": 4}[mesh.topology.cell_name()] if dim else 1
-    )
+    corners = len(basix.topology(mesh.basix_cell())[dim][0])
     if not len(entities):  # entities_to_geometry of dolfinx 0.9 divides by their number
         return np.empty((0, corners), dtype=np.int64)
     # of curved facets the corners come before the other nodes
@@ -307,7 +299,10 @@ def _corners(mesh: Mesh, dim: int) -> NDArray[np.int64]:
 
 
 def _entities(here: NDArray[np.int64], wanted: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Which entities have some corners."""
+    """Which of the local entities, by their numbers or those of their corners, are wanted."""
+    wanted = wanted.reshape(-1, here.shape[1])
+    among = np.zeros(1 + max(here.max(initial=0), wanted.max(initial=0)), dtype=bool)
+    among[wanted] = True
+    near = np.flatnonzero(among[here].all(axis=1)).astype(np.int32)
     # rows are compared where all corners are among those wanted: few
-    near = np.flatnonzero(np.isin(here, wanted).all(axis=1)).astype(np.int32)
-    return near[rows_in(np.sort(here[near], axis=1), np.sort(wanted, axis=1))]
+    return near[rows_in(np.sort(here[near], axis=1), np.sort(wanted, axis=1))] if here.shape[1] > 1 else near

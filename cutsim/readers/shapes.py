@@ -108,12 +108,12 @@ def in_order_of_vtk(cell: str, nodes: NDArray[np.integer]) -> tuple[str, Indices
 
     Args:
         cell: Cell as dolfinx calls it; of an interval the type is a line.
-        nodes: Nodes of the cells, corners first; those of more than degree 2 are left out.
+        nodes: Nodes of the cells, corners first; of more than degree 2 the corners are taken.
     """
     known = {count: shape for shape, (name, degree, count) in USABLE.items() if name == cell and degree < 3}
     if cell == "interval":
         return "line", nodes[:, :2].astype(np.int64)
-    count = max(count for count in known if count <= nodes.shape[1])
+    count = nodes.shape[1] if nodes.shape[1] in known else min(known)
     order = np.argsort(cpp.io.perm_vtk(getattr(CellType, cell), count))
     return known[count], nodes[:, :count][:, order].astype(np.int64)
 

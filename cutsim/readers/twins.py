@@ -135,6 +135,8 @@ def _paired(rows: Indices) -> Indices:
 def _named(parts: Parts, of: Indices, rows: Indices) -> Iterator[tuple[str, Indices]]:
     """Rows of each pair of parts, under the names of both."""
     names = list(parts.groups)
-    for one, other in np.unique(of, axis=0):
+    pairs, which, count = np.unique(of, axis=0, return_inverse=True, return_counts=True)
+    order = np.split(np.argsort(which.ravel(), kind="stable"), np.cumsum(count)[:-1])
+    for (one, other), own in zip(pairs, order, strict=False):
         if one >= 0 and other >= 0:
-            yield f"{names[one]}|{names[other]}", rows[(of == (one, other)).all(axis=1)]
+            yield f"{names[one]}|{names[other]}", rows[own]
