@@ -1,7 +1,7 @@
 """A run with everything on. As a script: save its state and go on, or restore the state and go on, for ten steps.
 
-python coupled_run.py save FOLDER    writes state.pickle and whole.pickle
-python coupled_run.py resume FOLDER  reads state.pickle, writes resumed.pickle
+python coupled_run.py save FOLDER    writes state.h5 and whole.pickle
+python coupled_run.py resume FOLDER  reads state.h5, writes resumed.pickle
 """
 
 import pickle
@@ -11,7 +11,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 from cutsim import StepControl, run
-from cutsim.analysis.checkpoint import load, save
+from cutsim.results.checkpoint_file import read_checkpoint, write_checkpoint
 from helpers.coupled import coupled
 
 #: Time at which the state is saved, size of the steps, and their number afterwards.
@@ -34,12 +34,12 @@ def go_on(problem):
 
 def main(what, folder):
     """Save or resume."""
-    problem, path = coupled(MPI.COMM_SELF), folder / "state.pickle"
+    problem, path = coupled(MPI.COMM_SELF), folder / "state.h5"
     if what == "save":
         run(problem, SAVED, StepControl.fixed(STEP))
-        path.write_bytes(pickle.dumps(save(problem)))
+        write_checkpoint(path, problem, {})
     else:
-        load(problem, pickle.loads(path.read_bytes()))
+        read_checkpoint(path, problem, {})
     name = {"save": "whole", "resume": "resumed"}[what]
     (folder / f"{name}.pickle").write_bytes(pickle.dumps(go_on(problem)))
 
