@@ -59,8 +59,8 @@ def things():
 NAMED = {
     "direction": (0.0, 1.0), "entities": "@entities", "facets": "@facets", "master_facets": "@master_facets",
     "plus": "@plus", "poisson": 0.3, "slave_facets": "@slave_facets", "supports": [], "surfaces": ["@surface"],
-    "terms": ["@solid"], "tools": ["@tool"], "vertices": "@vertices", "x": LINE, "xlabel": "x", "y": LINE, "ylabel": "y",
-    "curves": [cutsim.Curve(LINE, LINE)], "history": {}, "parts": {"part": LINE}, "path": "file.msh",
+    "terms": ["@solid"], "tools": ["@tool"], "vertices": "@vertices", "x": LINE, "xlabel": "x", "y": LINE,
+    "ylabel": "y", "curves": [cutsim.Curve(LINE, LINE)], "history": {}, "parts": {"part": LINE}, "path": "file.msh",
     "position": lambda t: np.zeros(2), "solids": "@solid", "total": LINE,
 }  # fmt: skip
 
