@@ -67,7 +67,7 @@ def _answered(file: Path, text: str) -> str:
             try:
                 read_case(file, {**answers, key: answer})
             except CaseError as error:
-                return error.problems[0]
+                return error.problems[0].partition(f": {key}: ")[2] or error.problems[0]
             return True
 
         answers[key] = str(questionary.text(f"{key} ({words})", default=value, validate=valid).unsafe_ask())
