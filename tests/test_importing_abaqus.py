@@ -140,7 +140,10 @@ top, 3, 3, {1}
 upper, P, 3
 *CLOAD
 6, 2, -4
+7, 2, -4
 *END STEP"""
+#: Nodes with the same force are one load.
+CORNERS = [[1, 0, 1], [1, 1, 1]]
 
 
 def test_values_through_steps(tmp_path):
@@ -149,8 +152,8 @@ def test_values_through_steps(tmp_path):
     assert result.untranslated == () and case["analysis"]["until"] == 3.0
     assert [value(case, "top_z", t) for t in (0.5, 1, 2, 3)] == pytest.approx([0.25, 0.5, 0.35, 0.2])
     assert [value(case, "upper_pressure", t) for t in (1, 2, 3)] == pytest.approx([0, 1.5, 3])
-    force = case["loads"]["node_force"]
-    assert (force["points"], force["direction"], value(case, "node_force", 3)) == ([[1, 0, 1]], [0, 1, 0], -4)
+    force = case["loads"]["nodes_force"]
+    assert (force["points"], force["direction"], value(case, "nodes_force", 3)) == (CORNERS, [0, 1, 0], -4)
     amplitude = "*AMPLITUDE, NAME=a\n0, 1, 1, 2, 2, 0"
     case = imported(tmp_path, steps=f"{PULL}\n{SECOND.format(', AMPLITUDE=A', 0.5)}", model=amplitude)[0]
     assert [value(case, "top_z", t) for t in (1, 1.5, 2, 2.5, 3)] == pytest.approx([0.5, 0.75, 1, 0.5, 0])

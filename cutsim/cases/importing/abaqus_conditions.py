@@ -82,13 +82,12 @@ class Conditions:
         return "facets" if quadratic else "vertices", names[0]
 
     def _write_supports(self) -> None:
-        for (key, where, dof), history in self._supports.items():
+        for (key, where, dof), history in _together(self._supports):
             value = history.timed()
             amount = {} if value.vanishes else {"value": value.value(self._file.end)}
-            place = [_point(where)] if key == "points" else where
-            label = "node" if key == "points" else where
-            values = {key: place, "direction": _AXES[dof - 1], **amount}
-            self._file.draft.add("supports", f"{label}_{_AXES[dof - 1]}", values, self._comments[key, where, dof])
+            values = {key: _places(key, where), "direction": _AXES[dof - 1], **amount}
+            label = "nodes" if key == "points" else where[0]
+            self._file.draft.add("supports", f"{label}_{_AXES[dof - 1]}", values, self._comments[key, where[0], dof])
 
     # -- loads ----------------------------------------------------------------------------------------------------
 
@@ -161,20 +160,42 @@ class Conditions:
         return ("DLOAD", "weight", names, tuple(c / size for c in vector)), size * value
 
     def _write_loads(self) -> None:
+        on_nodes = {key[1:]: history for key, history in self._loads.items() if key[1] in _ON_NODES}
+        for (kind, where, direction), history in _together(on_nodes):
+            values = {"kind": "force", kind: _places(kind, where), "direction": list(direction)}
+            label = "nodes" if kind == "points" else where[0]
+            self._add_load(f"{label}_force", values, history, self._comments["CLOAD", kind, where[0], direction])
         for key, history in self._loads.items():
             _, kind, where, direction = key
-            values: dict[str, Any] = {"kind": "force" if kind in _ON_NODES else kind}
-            label = "node" if kind == "points" else "_".join(where) if isinstance(where, tuple) else where
             if kind in _ON_NODES:
-                values[kind] = [_point(where)] if kind == "points" else where
-            elif isinstance(where, tuple):
+                continue
+            values = {"kind": kind} | ({"direction": list(direction)} if direction else {})
+            if isinstance(where, tuple):
                 values |= {"bodies": list(where)} if where else {}
             else:
                 values["facets"] = where
-            values |= {"direction": list(direction)} if direction else {}
-            values["value"] = history.timed().value(self._file.end)
             values |= {"current_area": True} if kind == "traction" and self._file.large else {}
-            self._file.draft.add("loads", f"{label}_{values['kind']}".strip("_"), values, self._comments[key])
+            label = "_".join(where) if isinstance(where, tuple) else where
+            self._add_load(f"{label}_{kind}".strip("_"), values, history, self._comments[key])
+
+    def _add_load(self, name: str, values: dict[str, Any], history: History, comment: str) -> None:
+        self._file.draft.add("loads", name, values | {"value": history.timed().value(self._file.end)}, comment)
+
+
+def _together(
+    histories: Mapping[tuple[str, str, Any], History],
+) -> Iterator[tuple[tuple[str, list[str], Any], History]]:
+    """Conditions on nodes, those of single nodes that are the same at all times as one."""
+    found: dict[tuple[Any, ...], tuple[tuple[str, list[str], Any], History]] = {}
+    for (key, where, what), history in histories.items():
+        alike = (what, *history.times, *history.values) if key == "points" else where
+        found.setdefault((key, what, alike), ((key, [], what), history))[0][1].append(where)
+    yield from found.values()
+
+
+def _places(key: str, where: list[str]) -> Any:
+    """Value of the case file for nodes: positions, or the name of a set."""
+    return [_point(text) for text in where] if key == "points" else where[0]
 
 
 def _held(entries: list[str], line: int) -> Iterator[tuple[int, float]]:
