@@ -10,6 +10,7 @@ from cutsim.results import report
 from cutsim.results.presentation import plot_run, present
 from cutsim.results.report import write_report, write_sweep_report
 from cutsim.results.run_files import RunFiles
+from cutsim.results.web_plots import energy_json, heat_json
 from helpers.stages import HEADER, write_run
 
 CASE = """title = "A cut </script> & more"
@@ -105,6 +106,23 @@ def test_report_of_nothing_names_what_is_missing(tmp_path):
         words = Page(write_report(tmp_path)).text
         assert "summary.json cannot be read" in words and "there is no curve" in words
         assert plot_run(RunFiles.read(tmp_path)) == []
+
+
+def test_audits_are_stacks_beside_what_they_add_up_to(tmp_path):
+    write_run(tmp_path)
+    names = ["friction", "inflow", "stored", "outflow", "closure"]
+    rows = ["time [s]," + ",".join(f"heat_{name} [mJ]" for name in names), "1,2,1,3,0,0", "2,4,1,4.5,0,0.1"]
+    history = RunFiles.read(tmp_path).history
+    assert heat_json(history) is None
+    energies = {trace["name"] for trace in json.loads(energy_json(history))["data"]}
+    assert energies == {"strain", "fracture", "external work", "closure"}  # what vanishes is left out
+    (tmp_path / "history.csv").write_text("\n".join(rows) + "\n")
+    history = RunFiles.read(tmp_path).history
+    assert energy_json(history) is None
+    traces = json.loads(heat_json(history))["data"]
+    assert [trace["name"] for trace in traces] == ["stored", "gained", "closure"]
+    text = Page(write_report(tmp_path)).text
+    assert "there is no energy audit" in text and "What is stored as heat" in text
 
 
 @pytest.mark.parametrize("odd", [None, 1, "x", True, [[1], 2], {"a": None}], ids=str)

@@ -19,7 +19,7 @@ from cutsim.results.overlay import Overlay
 from cutsim.results.run_files import RunFiles
 from cutsim.results.stages import FOLDER, read_stages
 from cutsim.results.turnable import view_json
-from cutsim.results.web_plots import columns_json, curves_json, energy_json
+from cutsim.results.web_plots import columns_json, curves_json, energy_json, heat_json
 
 logger = logging.getLogger(__name__)
 
@@ -64,6 +64,7 @@ def write_report(folder: Path | str) -> Path:
     resumable = not run.complete and any((run.folder / CHECKPOINTS).glob("*"))
     missing += [words for name, words in _MISSED.items() if not content[name]]
     numbers = {name: _number(value) for name, value in run.summary.items() if name not in _PLACED}
+    content["heat"] = _attempt("audit of heat", lambda: heat_json(run.history), missing)
     page = _page(
         "run.html", run=run, tiles=tiles(run), sizes=dict(_sizes(run)), numbers=numbers, missing=missing,
         resumable=resumable, **content,

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from cutsim.results.plots import ENERGIES, Curve, distinct
+from cutsim.heat.audit import GAINED, SPENT
+from cutsim.results.plots import COLOURS, ENERGIES, Curve, distinct
 from cutsim.results.run_files import Column
 
 # digits of the numbers in a page
@@ -58,24 +59,41 @@ def energy_json(history: Mapping[str, Column]) -> str | None:
     """
     if not {"time", "work_external", "energy_closure"} <= set(history):
         return None
-    time, work = history["time"], history["work_external"]
-    if not len(time.values):
+    return _audit(history, ENERGIES, ("external work", history["work_external"].values), "energy")
+
+
+def heat_json(history: Mapping[str, Column]) -> str | None:
+    """Audit of heat: what is stored and has left, stacked, beside what was gained; arguments as `energy_json`."""
+    if not {"time", "heat_closure"} <= set(history):
+        return None
+    spent = dict(zip((f"heat_{name}" for name in SPENT), zip(SPENT, COLOURS, strict=False), strict=False))
+    gained = np.sum([history[f"heat_{name}"].values for name in GAINED if f"heat_{name}" in history], axis=0)
+    return _audit(history, spent, ("gained", gained), "heat")
+
+
+def _audit(
+    history: Mapping[str, Column], parts: Mapping[str, tuple[str, str]], total: tuple[str, Any], name: str
+) -> str | None:
+    """Parts of a quantity, column → label and colour, as a stack beside what they add up to, with the closure."""
+    time, shown = history["time"], [column for column in parts if column in history]
+    if not len(time.values) or not shown:
         return None
     figure = go.Figure(layout=LAYOUT)
-    for name, (label, colour) in ENERGIES.items():
-        if name in history and np.any(history[name].values):
+    for column in shown:
+        label, colour = parts[column]
+        if np.any(history[column].values):
             figure.add_scatter(
-                x=time.values, y=history[name].values, name=label, stackgroup="energies", fillcolor=colour,
+                x=time.values, y=history[column].values, name=label, stackgroup="parts", fillcolor=colour,
                 line={"color": colour, "width": 0.5},
             )  # fmt: skip
-    figure.add_scatter(x=time.values, y=work.values, name="external work", line={"color": "black", "width": 2})
+    figure.add_scatter(x=time.values, y=total[1], name=total[0], line={"color": "black", "width": 2})
     figure.add_scatter(
-        x=time.values, y=100 * history["energy_closure"].values, name="closure", yaxis="y2", showlegend=False,
+        x=time.values, y=100 * history[f"{name}_closure"].values, name="closure", yaxis="y2", showlegend=False,
         line={"color": "#555555", "width": 1.5},
     )  # fmt: skip
     figure.update_layout(
         xaxis={"title": {"text": time.label}, "anchor": "y2"},
-        yaxis={"title": {"text": f"energy [{work.unit}]"}, "domain": [0.28, 1]},
+        yaxis={"title": {"text": f"{name} [{history[shown[0]].unit}]"}, "domain": [0.28, 1]},
         yaxis2={"title": {"text": "closure [%]"}, "domain": [0, 0.2], "nticks": 4, "automargin": True},
         hovermode="x unified",
     )
