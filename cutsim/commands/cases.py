@@ -23,9 +23,11 @@ def command(
     ] = False,
 ) -> None:
     """List the built-in cases, which run as they are and are copied by `cutsim new --from NAME`."""
-    from cutsim.cases import built_in_cases, case_schema
+    from cutsim.cases import built_in_cases
 
     if schema:
+        from cutsim.cases import case_schema  # loads all of the package
+
         print(json.dumps(case_schema(), indent=1, ensure_ascii=False))
         return
     rows = [(name, title) for name, (title, _) in built_in_cases().items()]
