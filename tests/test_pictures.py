@@ -141,8 +141,12 @@ def test_scale_is_true(tmp_path):
     grid = pyvista.ImageData(dimensions=(5, 3, 1), spacing=(0.75, 0.5, 1.0)).cast_to_unstructured_grid()
     grid["u"] = np.zeros((grid.n_points, 3))
     grid.cell_data["s"] = np.arange(grid.n_cells, dtype=float)
-    draw_body(tmp_path / "scale.png", grid, "s", label="s", length="cm")
+    draw_body(tmp_path / "scale.png", grid, "s", label="s", length="cm", limits=(0.0, 7.0))
     pixels = colours(tmp_path / "scale.png")[0]
+    # the colours of a plane body are those of the bar
+    for end in (0.0, 1.0):
+        colour = matplotlib.colormaps["viridis"](end)[:3]
+        assert np.any(np.abs(pixels[150:850] - colour).max(axis=2) < 0.02)
     body = np.flatnonzero(np.any(pixels[:850] < 0.9, axis=(0, 2)))
     bar = np.flatnonzero(np.all(pixels[905:945, 1200:] < 0.1, axis=2).any(axis=0))
     assert (bar[-1] - bar[0]) / (body[-1] - body[0]) == pytest.approx(0.5 / 3.0, rel=0.02)

@@ -28,6 +28,9 @@ STRESS = "viridis"
 _LINE = "#20242a"
 # part of the picture that the body takes, in the direction in which it is larger
 _FILLED = 0.92
+# light on a body: in a plane problem its colours are exactly those of the bar
+_FLAT = {"ambient": 0.0, "diffuse": 1.0, "specular": 0.0}
+_LIT = {"ambient": 0.35, "diffuse": 0.75, "specular": 0.1}
 # width of a picture for which lines and marks are given [pixels]
 _WIDTH = 1600
 # sharp edges are drawn: those at which the surface turns by more than this angle [°]
@@ -103,7 +106,7 @@ class Scene:
         """Add a body coloured by a field, with or without the edges of its cells."""
         self._plotter.add_mesh(
             surface, scalars=scalars, cmap=colours, clim=limits, show_edges=edges, edge_color=_LINE, edge_opacity=0.25,
-            line_width=self._width, lighting=not self._flat, ambient=0.35, diffuse=0.75, specular=0.1,
+            line_width=self._width, lighting=not self._flat, **_FLAT if self._flat else _LIT,
             smooth_shading=not self._flat, split_sharp_edges=not self._flat, show_scalar_bar=False, opacity=opacity,
         )  # fmt: skip
 
