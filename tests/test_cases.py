@@ -414,6 +414,10 @@ WRONG = {
     "notch = 0.5": ("notch = -0.5", "insertion.notch: -0.5: must be a finite number >= 0"),
     "first = 0.02": ("first = 0.02\n[output]\nevery = 0.5\n[steps]", "must be TOML: Cannot declare"),
     'title = "': ('output.every = 0.5\ntitle = "', "output.every: 0.5: must be a whole number"),
+    "[steps]\n": (
+        "[support.plate]\nvalue = 1\n[steps]\n",
+        "support.plate: unknown key, .*; did you mean .supports.plate.",
+    ),
     "[law]": ("[tools.tool]\n[law]", "tool: given twice, as tools.tool and as tool"),
 }
 

@@ -15,6 +15,7 @@ from cutsim.cases.sizes import element_sizes, kind_of_cells
 from cutsim.fields.sizes import facet_size
 from cutsim.interface.cohesive import process_zone_element
 from cutsim.interface.crack import Crack
+from cutsim.interface.doubts import DEEP
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.solvers.iterations import Outcome
 from cutsim.tools.tool_contact import ToolContact
@@ -117,6 +118,8 @@ def _tools(simulation: Simulation) -> Iterator[Finding]:
         shaped = [tool for tool in contacts if isinstance(tool, ToolContact)]
         if shaped and np.isfinite(shaped[0].shape.resolution):
             yield _tool(f"tool {name}", shaped, simulation.units.of("length"))
+        if shaped:
+            yield _start(f"tool {name}", shaped)
 
 
 def _tool(topic: str, contacts: list[ToolContact], length: str) -> Finding:
@@ -126,6 +129,13 @@ def _tool(topic: str, contacts: list[ToolContact], length: str) -> Finding:
     smallest = min(-p.maximum(-facet_size(mesh, p.facets)) for p in points)
     coarse = f"{radius:.3g} {length} or less is needed" if smallest > (1 + 1e-6) * radius else ""
     return Finding(topic, f"elements under its radius of {radius:.3g} {length}", f"{smallest:.3g} {length}", coarse)
+
+
+def _start(topic: str, contacts: list[ToolContact]) -> Finding:
+    """Whether a tool begins within the body, where it would push before it moves. Collective."""
+    depth, blend = max(tool.penetration() for tool in contacts), contacts[0].blend
+    words = "it lies in the body before it moves: let it begin farther away" if depth - blend > DEEP else ""
+    return Finding(topic, "at the start, deepest point of the body in it", f"{max(depth, 0.0):.2g} elements", words)
 
 
 def _held(simulation: Simulation) -> Finding:

@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 from cutsim.base.checks import Refused
 from cutsim.cases.docstrings import arguments_of
 from cutsim.cases.document import Document, places
-from cutsim.cases.keys import Keys, nearest
+from cutsim.cases.keys import SINGULAR, Keys, nearest
 from cutsim.cases.scope import Scope
 
 _KINDS = ("model", "shape", "kind")
@@ -89,8 +89,15 @@ def _about_key(keys: Keys, document: Document, scope: Scope) -> str:
     if name in table.model_fields:
         described = arguments_of(table).get(name) or table.model_fields[name].description or ""
         return f"missing, must be given{': ' * bool(described)}{described}"
-    hint = _owner(name, document, scope) or nearest(name, table.model_fields)
+    hint = _named(keys, parent) or _owner(name, document, scope) or nearest(name, table.model_fields)
     return f"unknown key, must be one of {', '.join(table.model_fields)}{hint}"
+
+
+def _named(keys: Keys, parent: Any) -> str:
+    """The full form of a table whose name was put behind the short form; empty if it is none."""
+    tables, short, name = keys[-3:] if len(keys) > 2 else ("", "", "")
+    misplaced = SINGULAR.get(str(short)) == tables and isinstance(parent.get(name), Mapping)
+    return f"; did you mean [{tables}.{name}]?" if misplaced else ""
 
 
 def _owner(name: str, document: Document, scope: Scope) -> str:

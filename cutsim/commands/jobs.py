@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 logger = logging.getLogger(__name__)
 #: Longest time of a run on this machine [min]; that on a cluster is the user's choice.
 _ENDLESS = 60 * 24 * 365
+#: Exit status of a run that is told to end before it has begun.
+_ENDED_AT_ONCE = 128 + signal.SIGTERM
 
 
 @dataclass(frozen=True)
@@ -115,10 +117,12 @@ class Runner:
         try:
             with self._lock:
                 submitted = executor.submit(job.run)
-            return int(submitted.result())
+            status = int(submitted.result())
         except Exception as error:  # whatever submitit or the cluster has met
             logger.error("%s did not run: %s", job.folder, str(error).strip().splitlines()[-1])
             return Ending.INTERNAL
+        begun = status != _ENDED_AT_ONCE or not self._stopped.is_set()
+        return status if begun else Ending.INTERRUPTED
 
     @contextmanager
     def _interruptible(self, jobs: Sequence[Job]) -> Iterator[None]:

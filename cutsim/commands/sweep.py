@@ -29,7 +29,8 @@ def command(
     case: CaseArgument,
     *,
     vary: Annotated[
-        list[str], typer.Option(metavar="KEY=VALUES", help="Values a:b:number, a:b:number:log or v,v,…; repeat.")
+        list[str],
+        typer.Option(metavar="KEY=VALUES", help="first:last:number, first:last:number:log, or values v,v,…; repeat."),
     ],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder; results/CASE-sweep.")] = None,
     set_: Changes = None,
