@@ -124,7 +124,7 @@ def _elements(file: AbaqusFile, cells: str, counterpart: Counterpart) -> dict[st
     elif counterpart.uncoupled and all(block.shape in _BRICKS for block in blocks):
         values["volumetric"] = "mixed"
     for block in blocks:
-        if block.kind.rstrip("H").endswith("R") and block.shape in _BRICKS:
+        if block.kind.rstrip("H").endswith("R"):
             file.draft.difference(
                 block.line, f"*ELEMENT: {block.kind} with reduced integration are integrated fully here"
             )
