@@ -115,8 +115,8 @@ def _add_bar(figure: Figure, bar: Bar, left: float, width: float) -> None:
 
 def _add_legend(figure: Figure, entries: Sequence[Entry]) -> None:
     figure.legend(
-        handles=[entry.handle for entry in entries], loc="lower left", bbox_to_anchor=(0.01, -0.005), fontsize=8,
-        ncols=-(-len(entries) // _LINES), frameon=False, handlelength=1.3, handleheight=0.9, labelspacing=0.35,
+        handles=[entry.handle for entry in entries], loc="lower left", bbox_to_anchor=(0.01, -0.01), fontsize=7.5,
+        ncols=-(-len(entries) // _LINES), frameon=False, handlelength=1.3, handleheight=0.9, labelspacing=0.2,
         columnspacing=1.4,
     )  # fmt: skip
 
