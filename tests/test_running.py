@@ -37,7 +37,7 @@ def test_a_run_leaves_its_case_history_and_summary(folder):
     assert again.cracks == short().cracks and again.steps == short().steps and again.mesh == short().mesh
     history, summary = read_history(folder / "history.csv"), json.loads((folder / "summary.json").read_text())
     x, y = summary["curve"]
-    assert history[x][-1] == pytest.approx(0.2) and len(history[y]) == 10
+    assert history[x][-1] == pytest.approx(0.1) and len(history[y]) == 10
     assert summary["largest_upper_force"] == history[y].max() == pytest.approx(0.601, rel=0.02)
     assert (summary["ranks"], summary["verdict"]) == (COMM.size, "trusted")
     assert summary["mesh"]["cells"] > 0 and summary["unknowns"] > 3000 and "dolfinx" in summary["versions"]

@@ -72,7 +72,6 @@ def run_case(
     *,
     resume: bool = False,
     overwrite: bool = False,
-    every_minutes: float = 10.0,
     quiet: bool = False,
 ) -> RunOutcome:
     """Run a case in a folder. Collective.
@@ -86,7 +85,6 @@ def run_case(
         comm: Communicator of the run.
         resume: Whether the run goes on from the last checkpoint in the folder, if there is one.
         overwrite: Whether the results of an older run in the folder are replaced.
-        every_minutes: Time between two checkpoints [min].
         quiet: Whether no progress is shown.
 
     Returns:
@@ -99,7 +97,9 @@ def run_case(
     """
     begun, folder = monotonic(), Path(folder)
     simulation = case.build(comm)
-    checkpoints = Checkpoints(folder / CHECKPOINTS, simulation.problem, minutes=every_minutes, case=_identity(case))
+    checkpoints = Checkpoints(
+        folder / CHECKPOINTS, simulation.problem, minutes=case.output.checkpoint_minutes, case=_identity(case)
+    )
     time = checkpoints.resume() if resume else None
     if time is None:
         with refusing(case.document, "supports"):

@@ -159,6 +159,8 @@ class Output(Table):
         format: Files for ParaView: "vtx" needs ADIOS2, "vtu" nothing; by default what dolfinx can write.
         animation: Whether an animation is made at the end.
         report: Whether a report is made at the end.
+        checkpoint_minutes: Minutes of computing > 0 after which a checkpoint is written; another one is written at the
+            end.
     """
 
     curve: tuple[str, str] | None = None
@@ -168,6 +170,7 @@ class Output(Table):
     format: Literal["vtx", "vtu"] | None = None
     animation: Flag = True
     report: Flag = True
+    checkpoint_minutes: Annotated[Number, POSITIVE] = 10.0
 
 
 class AnySteps:
