@@ -10,6 +10,7 @@ import sys
 import time
 import tomllib
 from pathlib import Path
+from threading import Timer
 from types import SimpleNamespace
 
 import numpy as np
@@ -213,6 +214,19 @@ def test_jobs_are_processes_that_keep_their_exit_status(tmp_path):
     Runner(tmp_path / "jobs", 2, "local", {}).run(jobs, lambda job, status: ended.update({job.folder.name: status}))
     assert ended == {"good": 0, "bad": 2}
     assert jobs[0].log.read_text() == f"cutsim {cutsim.__version__}\n"
+
+
+def test_a_job_that_ends_before_it_has_begun_is_interrupted(tmp_path):
+    runner, job, ended = Runner(tmp_path / "jobs", 1, "local", {}), Job(tmp_path / "run", ("doctor",)), []
+
+    def interrupt():
+        while not job.pid.exists() or not job.pid.read_text():
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    Timer(0, interrupt).start()
+    runner.run([job], lambda job, status: ended.append(status))
+    assert ended == [Ending.INTERRUPTED]
 
 
 # -- results ----------------------------------------------------------------------------------------------------------

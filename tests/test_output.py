@@ -201,6 +201,9 @@ def test_plain_progress_ends_with_the_last_step():
         ]
     else:
         assert not text.getvalue()
+    with Progress(2.0, MPI.COMM_WORLD, start=1.0, console=Console(file=text)) as resumed:
+        resumed.update(1.5)
+    assert ("75%" in text.getvalue()) == (MPI.COMM_WORLD.rank == 0)
     with pytest.raises(ValueError, match="end = 0"):
         Progress(0.0, MPI.COMM_WORLD)
 

@@ -40,16 +40,26 @@ def endings() -> Iterator[None]:
     """
     try:
         yield
-    except (typer.Exit, typer.Abort, typer.TyperException):
+    except (typer.Exit, typer.Abort, typer.TyperException, BrokenPipeError):  # typer ends the program
         raise
+    except KeyboardInterrupt:
+        say("interrupted")
+        raise typer.Exit(Ending.INTERRUPTED) from None
     except Exception as error:
         ending = ending_of(error)
         if ending is Ending.INTERNAL:
             say("".join(traceback.format_exception(error)) + "This is a fault of cutsim itself: please report it.")
         else:
-            say(str(error))
+            say(_words(error))
             logger.debug("this ended the command", exc_info=error)
         raise typer.Exit(ending) from error
+
+
+def _words(error: Exception) -> str:
+    """What an error says; one of the operating system without its number."""
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return str(error)
 
 
 def ending_of(error: Exception) -> Ending:

@@ -68,8 +68,8 @@ def command(
     terms: Annotated[int, typer.Option(min=1, max=3, help="Terms of Ogden's solids.")] = 1,
     x: Annotated[str | None, typer.Option("-x", "--x", help="Column of strain or travel: 'title:unit'.")] = None,
     y: Annotated[str | None, typer.Option("-y", "--y", help="Column of stress or force: 'title:unit'.")] = None,
-    length: Annotated[float | None, typer.Option(help="Length of the specimen [mm], for tables of travel.")] = None,
-    area: Annotated[float | None, typer.Option(help="Area of the specimen [mm²], for tables of force.")] = None,
+    length: Annotated[float | None, typer.Option(help=r"Length of the specimen \[mm], for tables of travel.")] = None,
+    area: Annotated[float | None, typer.Option(help=r"Area of the specimen \[mm²], for tables of force.")] = None,
     offset: Annotated[list[Offset] | None, typer.Option(help="Fit zeros of the tests too: preload, slack.")] = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="Snippet for a case file; the plot is written beside it.")

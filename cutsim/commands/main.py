@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 from typer.core import TyperGroup
 
 import cutsim
@@ -84,7 +85,7 @@ app = typer.Typer(
 def _help(module: ModuleType) -> str:
     """What a command is for: its docstring, of which each paragraph is a line, up to its sections."""
     paragraphs = [" ".join(lines.split()) for lines in (module.command.__doc__ or "").split("\n\n")]
-    return "\n\n".join(takewhile(lambda text: not text.startswith(("Args:", "Raises:")), paragraphs))
+    return escape("\n\n".join(takewhile(lambda text: not text.startswith(("Args:", "Raises:")), paragraphs)))
 
 
 for panel, commands in COMMANDS.items():

@@ -96,7 +96,7 @@ _Quiet = Annotated[bool, typer.Option("--quiet", "-q", callback=_quieter, help="
 Ranks = Annotated[int, typer.Option("-n", "--ranks", min=1, help="MPI ranks on this machine, which are started here.")]
 Width = Annotated[
     float | None,
-    typer.Option(min=1e-9, help="Width of the specimen [mm]: its force is divided by it, for plane cases."),
+    typer.Option(min=1e-9, help=r"Width of the specimen \[mm]: its force is divided by it, for plane cases."),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace what an older run has left in the folder.")]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from mpi4py import MPI
 from rich.console import Console
@@ -26,7 +26,7 @@ class Progress:
         end: Value of the load parameter at which the run is done.
         comm: Communicator of the run.
         title: What is running, in a word or two.
-        start: Value of the load parameter at which the run begins.
+        start: Value of the load parameter at which the run begins, or from which a resumed run goes on.
         console: Where to write; standard output by default.
         interval: Seconds between plain lines.
         quiet: Whether nothing is shown.
@@ -64,9 +64,9 @@ class Progress:
             return
         text = "  ".join(f"{name} {_short(value)}" for name, value in {"t": t, **info}.items())
         if self._bar is not None:
-            self._bar.update(self._task, completed=t - self._start, info=text)
+            self._bar.update(self._task, completed=t, info=text)
             return
-        share = (t - self._start) / (self._end - self._start)
+        share = t / self._end
         self._line = f"{self._title}: {share:4.0%}  {text}"
         if time.monotonic() - self._last >= self._interval:
             self._print()
@@ -87,7 +87,8 @@ class Progress:
                 TextColumn("{task.fields[info]}"),
                 console=self._console,
             )
-            self._task = self._bar.add_task(self._title, total=self._end - self._start, info="")
+            begun: Any = self._start  # rich counts in numbers of any kind, whatever it says of them
+            self._task = self._bar.add_task(self._title, completed=begun, total=self._end, info="")
             self._bar.start()
         return self
 
