@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cutsim.commands.case_files import CaseArgument, Changes, Quick, case_path, settings
-from cutsim.commands.endings import Ending
+from cutsim.commands.endings import Ending, say
 from cutsim.commands.options import Ranks, Width, console, on_ranks
 
 if TYPE_CHECKING:
@@ -78,6 +79,8 @@ def command(
     if MPI.COMM_WORLD.rank == 0:
         (folder / "fitted.toml").write_text(best.text, encoding="utf-8")
         _show(fit, read_source(data, csv_x, csv_y, width), folder)
+        for reason in outcome.reasons:
+            say(f"against the fitted run: {reason}")
     raise typer.Exit(outcome.exit_code or (Ending.QUESTIONABLE if fit.systematic else Ending.TRUSTED))
 
 
@@ -119,7 +122,8 @@ class Forward:
 
         from cutsim.base.checks import require
 
-        simulation = self.case(values).build(MPI.COMM_WORLD)
+        with _unsaid():
+            simulation = self.case(values).build(MPI.COMM_WORLD)
         state = simulation.problem.state
         plane = state.mesh.geometry.dim == 2 and not state.axisymmetric
         require("width", self.per_width, self.per_width == plane, "given for plane cases, and only for those")
@@ -132,12 +136,26 @@ class Forward:
                 require("output.curve", name, kind == wanted, f"a column of a {wanted}, as it was measured")
             rows.append(tuple(value for value, _ in found))
 
-        simulation.run(record)
+        with _unsaid():
+            simulation.run(record)
         where = ", ".join(f"{key} = {value:.5g}" for key, value in values.items())
         for reason in state.verdict.reasons:
-            logger.warning("at %s: %s", where, reason)
+            logger.info("at %s: %s", where, reason)
         x, y = np.array(rows).T
         return x, y
+
+
+@contextmanager
+def _unsaid() -> Iterator[None]:
+    """Leave doubts to the fitted run, unless more is to be said: each simulation of a fit has the same."""
+    package = logging.getLogger("cutsim")
+    level = package.level
+    if level in (logging.NOTSET, logging.WARNING):  # in a process of its own nothing is set
+        package.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        package.setLevel(level)
 
 
 @dataclass(frozen=True)

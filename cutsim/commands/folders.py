@@ -92,6 +92,8 @@ def run_files(folder: Path) -> RunFiles:
     Raises:
         FileNotFoundError: There is no such folder, or it has no history.
     """
+    if not folder.exists():
+        raise FileNotFoundError(f"{folder} is not there: neither a folder of a run nor a file of measurements")
     run = RunFiles.read(folder)
     if not run.history:
         raise FileNotFoundError(f"{folder} is no folder of a run: {'; '.join(run.missing) or 'its history is empty'}")

@@ -32,6 +32,7 @@ _TYPES = {".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
 # entries of a summary that have a place of their own in a report
 _PLACED = {
     "verdict", "reasons", "time", "until", "versions", "ranks", "wall_time", "unknowns", "mesh", "curve", "command",
+    "title",
 }  # fmt: skip
 
 T = TypeVar("T")
