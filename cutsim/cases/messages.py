@@ -73,8 +73,13 @@ def refusal(refused: Refused, keys: Keys, node: Any, document: Document) -> str:
     name, value = refused.name, refused.value
     if name.replace(".", "").isidentifier():
         keys = (*keys, *name.split("."))
-        value = node.get(name, value) if isinstance(node, Mapping) else value
-        return document.problem(keys, f"must be {refused.allowed.removesuffix(' or None')}", value)
+        hint = ""
+        if isinstance(node, Mapping):
+            value = node.get(name, value)
+            hint = (
+                next(filter(None, (_named((*keys[:-1], inner), node) for inner in node)), "") if value is None else ""
+            )
+        return document.problem(keys, f"must be {refused.allowed.removesuffix(' or None')}{hint}", value)
     return document.problem(keys, f"{name} = {value!r} must be {refused.allowed}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import platform
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,8 @@ from cutsim.results.presentation import present
 from cutsim.results.recording import Recording
 from cutsim.results.report import CHECKPOINTS
 from cutsim.results.stage_recorder import Stages
+
+logger = logging.getLogger(__name__)
 
 #: Name of the complete case in the folder of its run.
 CASE = "case.toml"
@@ -105,6 +108,8 @@ def run_case(
         with refusing(case.document, "supports"):
             simulation.problem.check()
     elif time >= simulation.until:  # the run has come to its end
+        if comm.rank == 0:
+            logger.warning("%s has come to its end: there is nothing to go on with", folder)
         return _outcome(simulation, folder)
     else:
         begun -= comm.bcast(_seconds(folder))

@@ -20,6 +20,11 @@ EXAMPLES = (
     "cutsim run mine.toml -n 2 --overwrite",
 )
 
+_ADVICE = (
+    "Where a crack has begun to run by itself, a little viscosity in [body] carries the run across. "
+    'What else may be the cause is in the user guide, under "When a step fails".'
+)
+
 
 def command(
     case: CaseArgument,
@@ -53,6 +58,8 @@ def end(outcome: RunOutcome) -> NoReturn:
     """
     if outcome.error is not None and outcome.exit_code != Ending.INTERRUPTED:  # which the run itself says
         say(str(outcome.error))
+    if outcome.exit_code == Ending.NO_EQUILIBRIUM:
+        say(_ADVICE)
     if not quiet() and first_rank():
         hint = f"; cutsim resume {outcome.folder} goes on" if outcome.exit_code == Ending.INTERRUPTED else ""
         console().print(f"results: {outcome.folder}{hint}", markup=False)
