@@ -418,6 +418,7 @@ WRONG = {
         "[support.plate]\nvalue = 1\n[steps]\n",
         "support.plate: unknown key, .*; did you mean .supports.plate.",
     ),
+    '"0.777 MPa"': ('"0.777 Mpa"', "material.young: '0.777 Mpa': .* 'Mpa' is no unit; did you mean 'MPa'"),
     "[tool]": ("[tool.knife]", r"tool.shape: must be one of .*; did you mean .tools.knife.\?"),
     "[law]": ("[tools.tool]\n[law]", "tool: given twice, as tools.tool and as tool"),
 }

@@ -8,6 +8,7 @@ import pint
 
 from cutsim.base.checks import require
 from cutsim.base.units import Kind, Units
+from cutsim.cases.keys import nearest
 
 _QUANTITY = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?+)\s*((?:1\s*/\s*)?[^\W\d_][^+\[\]{}'\"]*|[°%].*)"
@@ -30,6 +31,13 @@ def split(text: str) -> tuple[float, str] | None:
     return None if match is None else (float(match[1]), match[2].strip())
 
 
+# symbols whose capitals are easily mistaken
+_USUAL = (
+    "m", "cm", "mm", "um", "N", "mN", "kN", "Pa", "kPa", "MPa", "GPa", "N/m", "N/mm", "J/m^2", "kJ/m^2", "mJ/mm^2",
+    "MPa s", "kPa s", "s", "ms", "min", "mm/s", "mm/min", "m/s", "K", "degC", "deg", "rad", "kg/m^3", "g/cm^3", "1/K",
+)  # fmt: skip
+
+
 @lru_cache(maxsize=512)
 def unit(symbol: str) -> Any:
     """Unit of a symbol, as pint knows it.
@@ -42,7 +50,7 @@ def unit(symbol: str) -> Any:
             raise ValueError
         return _registry().parse_units(symbol)
     except Exception:  # what the parser of pint makes of an arbitrary text
-        raise ValueError(f"{symbol!r} is no unit") from None
+        raise ValueError(f"{symbol!r} is no unit{nearest(symbol, _USUAL)}") from None
 
 
 def consistent(units: Units) -> Units:

@@ -50,7 +50,7 @@ class Parts(Table):
     """What is simulated.
 
     Args:
-        mesh: Mesh.
+        mesh: Mesh: a file, or a built-in geometry.
         groups: Further groups of facets and cells by name, selected from those of the mesh.
         layers: Layers of a block, from the surface downwards; with the geometry "laminate".
         material: Material of bodies and layers that have none of their own.
@@ -101,7 +101,7 @@ class CaseTables(Parts, Header):
 
     Args:
         analysis: Analysis.
-        steps: Step control.
+        steps: Step control: the first and the largest step, or a fixed one.
         solver: Solver.
         measures: Further columns of the history by name.
         output: Output.
