@@ -24,7 +24,7 @@ from cutsim.cases.keys import dotted
 from cutsim.cases.refusals import refusing
 from cutsim.cases.sizes import mesh_sizes
 from cutsim.results.checkpoints import Checkpoints
-from cutsim.results.output import on_root, replace_file
+from cutsim.results.output import claim_folder, on_root, replace_file
 from cutsim.results.presentation import present
 from cutsim.results.recording import Recording
 from cutsim.results.report import CHECKPOINTS
@@ -99,6 +99,8 @@ def run_case(
         FileExistsError: The folder has the results of an older run, which are not to be replaced.
     """
     begun, folder = monotonic(), Path(folder)
+    if not (resume or overwrite):
+        claim_folder(folder, comm, subfolders=False)  # before it is meshed, which may take long
     simulation = case.build(comm)
     checkpoints = Checkpoints(
         folder / CHECKPOINTS, simulation.problem, minutes=case.output.checkpoint_minutes, case=_identity(case)
