@@ -379,5 +379,6 @@ def test_a_killed_run_goes_on(ranks, tmp_path):
         assert step <= rows <= step + 1
     end = step_of(tmp_path / "killed") + 2
     whole, resumed = go(tmp_path / "whole", end), go(tmp_path / "killed", end)
-    same(whole, resumed)
+    # on other ranks Newton's iterations end at another rounding
+    same(whole, resumed, 1e-10 if ranks == 1 else 1e-9)
     assert rows_of(tmp_path / "killed") == rows_of(tmp_path / "whole") == end
