@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
@@ -146,14 +147,19 @@ def fit_simulation(
     require_number("workers", workers, count(1))
     require("workers", workers, workers == 1 or ranks == 1, "1 on several ranks")
     require_problem(guess, len(y), bounds)
-    # children must not inherit the state of MPI: no fork
-    pool = ProcessPoolExecutor(workers, get_context("spawn")) if workers > 1 else nullcontext()
+    pool = _pool(workers) if workers > 1 else nullcontext()
     with pool as executor, Progress(evaluations, MPI.COMM_WORLD, "fit", start=0) as progress:
         known = Evaluations(simulate, store, executor.map if executor else map)
         problem = _Problem(known, guess, x, y, bounds, step, progress)
         best = _SEARCHES[method](problem, tolerance, evaluations)
         jacobian = problem.jacobian(best)
     return finished(guess, best, jacobian, y, problem.residuals(best), problem.limits)
+
+
+def _pool(workers: int) -> ProcessPoolExecutor:
+    """Processes that do not inherit the state of MPI, as forks would, and that Ctrl-C ends without a traceback."""
+    quit_at_once = (signal.SIGINT, signal.SIG_DFL)
+    return ProcessPoolExecutor(workers, get_context("spawn"), initializer=signal.signal, initargs=quit_at_once)
 
 
 class _Problem:
