@@ -17,6 +17,7 @@ from petsc4py import PETSc
 
 import cutsim
 from cutsim.analysis.stepping import Interrupted, StepError, StepReport
+from cutsim.base.files import replace_file
 from cutsim.cases.building import Simulation
 from cutsim.cases.case import Case
 from cutsim.cases.document import places
@@ -24,18 +25,14 @@ from cutsim.cases.keys import dotted
 from cutsim.cases.refusals import refusing
 from cutsim.cases.sizes import mesh_sizes
 from cutsim.results.checkpoints import Checkpoints
-from cutsim.results.output import claim_folder, on_root, replace_file
+from cutsim.results.folder import CASE, CHECKPOINTS, SETUP, SUMMARY
+from cutsim.results.output import claim_folder, on_root
 from cutsim.results.presentation import present
 from cutsim.results.recording import Recording
-from cutsim.results.report import CHECKPOINTS
 from cutsim.results.stage_recorder import Stages
 
 logger = logging.getLogger(__name__)
 
-#: Name of the complete case in the folder of its run.
-CASE = "case.toml"
-#: Picture of the set-up there.
-SETUP = "setup.png"
 # keys that may be changed before a run is resumed: they say how, how far and for whom it is computed
 _FREE = {"title", "steps", "solver", "output", ("analysis", "until")}
 #: Exit codes of ends before the time.
@@ -123,7 +120,7 @@ def run_case(
     try:
         recording.summary(_facts(simulation, recording, monotonic() - begun))
         if case.output.report:
-            on_root(comm, lambda: _present(folder, animation=case.output.animation))
+            on_root(comm, lambda: present(folder, animation=case.output.animation))
     except OSError as full:
         error = error or full
     return _outcome(simulation, folder, error)
@@ -138,13 +135,9 @@ def _identity(case: Case) -> dict[str, Any]:
 def _seconds(folder: Path) -> float:
     """Time that earlier parts of a run have taken, as far as a summary says it [s]."""
     try:
-        return float(json.loads((folder / "summary.json").read_text(encoding="utf-8"))["wall_time"])
+        return float(json.loads((folder / SUMMARY).read_text(encoding="utf-8"))["wall_time"])
     except (OSError, ValueError, KeyError):  # it was killed before it wrote one
         return 0.0
-
-
-def _present(folder: Path, *, animation: bool) -> None:
-    present(folder, animation=animation)
 
 
 def _outcome(simulation: Simulation, folder: Path, error: BaseException | None = None) -> RunOutcome:

@@ -209,10 +209,12 @@ def _keep(folder: Path, case: Case) -> None:
     """Keep the simulations of an older fit if they are of the same case, else remove them. Collective."""
     from mpi4py import MPI
 
-    from cutsim.results.output import on_root, replace_file
+    from cutsim.base.files import replace_file
+    from cutsim.results.folder import CASE
+    from cutsim.results.output import on_root
 
     def keep() -> None:
-        known = folder / "case.toml"
+        known = folder / CASE
         if not known.exists() or known.read_text(encoding="utf-8") != case.text:
             (folder / _SIMULATIONS).unlink(missing_ok=True)
             folder.mkdir(parents=True, exist_ok=True)

@@ -25,8 +25,9 @@ def command(folder: FolderArgument, ranks: Ranks = 1) -> None:
     from mpi4py import MPI
 
     from cutsim.cases import read_case, run_case
+    from cutsim.results.folder import CASE, has_checkpoint
 
-    case = read_case(folder / "case.toml")
-    if not any((folder / "checkpoint").glob("*.h5")):
+    case = read_case(folder / CASE)
+    if not has_checkpoint(folder):
         say(f"{folder} has no checkpoint: the run begins anew")
     end(run_case(case, folder, MPI.COMM_WORLD, resume=True, overwrite=True, quiet=quiet()))

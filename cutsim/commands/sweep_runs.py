@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cutsim.base.files import replace_file
 from cutsim.commands.endings import Ending
 from cutsim.commands.jobs import Job
 from cutsim.commands.variation import Variant
@@ -47,7 +47,9 @@ class SweepRun:
     @property
     def begun(self) -> bool:
         """Whether it has left a history."""
-        return (self.folder / "history.csv").exists()
+        from cutsim.results.folder import HISTORY
+
+        return (self.folder / HISTORY).exists()
 
     @property
     def files(self) -> RunFiles:
@@ -74,8 +76,10 @@ class SweepRun:
 
     def job(self, ranks: int) -> Job:
         """The command that runs it, or goes on with it where it was interrupted."""
+        from cutsim.results.folder import has_checkpoint
+
         arguments = ["run", str(self.case), "-o", str(self.folder), "--overwrite"]
-        if any((self.folder / "checkpoint").glob("*.h5")):
+        if has_checkpoint(self.folder):
             arguments = ["resume", str(self.folder)]
         return Job(self.folder, (*arguments, "-n", str(ranks)))
 
@@ -98,10 +102,7 @@ class Statuses:
     def note(self, name: str, status: int) -> None:
         """Keep the exit status of a run."""
         self._known[name] = status
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        draft = self._path.with_suffix(".part")
-        draft.write_text(json.dumps(self._known, indent=2) + "\n", encoding="utf-8")
-        os.replace(draft, self._path)
+        replace_file(self._path, (json.dumps(self._known, indent=2) + "\n").encode())
 
     def words(self, run: SweepRun) -> str:
         """How a run has ended, in words."""

@@ -11,8 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from cutsim.results.folder import GIF, MP4, STAGES
 from cutsim.results.pictures import Look
-from cutsim.results.stages import FOLDER, Stage, read_stages, spread
+from cutsim.results.stages import Stage, read_stages, spread
 
 logger = logging.getLogger(__name__)
 
@@ -35,12 +36,12 @@ def draw_stages(folder: Path | str, number: int = PICTURES) -> list[Path]:
         The pictures; fewer where there are fewer stages or they cannot be drawn, which is logged as a warning.
     """
     stages = [stage.whole() for stage in read_stages(folder)]
-    for older in (Path(folder) / FOLDER).glob("[0-9][0-9].png"):
+    for older in (Path(folder) / STAGES).glob("[0-9][0-9].png"):
         older.unlink()
     drawn: list[Path] = []
     try:
         for index, stage in enumerate(spread(stages, number)):
-            path = Path(folder) / FOLDER / f"{index:02d}.png"
+            path = Path(folder) / STAGES / f"{index:02d}.png"
             Look.of(stages).figure(stage).savefig(path)
             drawn.append(path)
     except Exception as error:  # a picture is never worth a run
@@ -59,7 +60,7 @@ def animate(folder: Path | str) -> list[Path]:
     """
     stages, made = [stage.whole() for stage in read_stages(folder)], list[Path]()
     if len(stages) < 2:
-        logger.warning("there is no animation: %s has fewer than two stages", Path(folder) / FOLDER)
+        logger.warning("there is no animation: %s has fewer than two stages", Path(folder) / STAGES)
         return made
     try:
         frames = list(_frames(stages))
@@ -68,8 +69,8 @@ def animate(folder: Path | str) -> list[Path]:
         return made
     frames += [frames[-1]] * _LAST
     formats: dict[str, dict[str, Any]] = {
-        "animation.gif": {"duration": 1000 // _RATE, "loop": 0},
-        "animation.mp4": {"fps": _RATE, "macro_block_size": 2, "quality": 7},
+        GIF: {"duration": 1000 // _RATE, "loop": 0},
+        MP4: {"fps": _RATE, "macro_block_size": 2, "quality": 7},
     }
     for name, options in formats.items():
         try:

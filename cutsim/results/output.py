@@ -21,9 +21,7 @@ from cutsim.base.checks import require
 from cutsim.base.files import replace_file
 from cutsim.base.signatures import checked
 from cutsim.base.units import Units
-
-#: Name of the file with the rows of a run.
-HISTORY = "history.csv"
+from cutsim.results.folder import HISTORY, SUMMARY
 
 
 class Closing:
@@ -160,12 +158,27 @@ def read_history(path: Path | str) -> dict[str, NDArray[np.float64]]:
     Returns:
         Column name without its unit -> values, one per complete row.
     """
+    return {name: values for name, _, values in labelled_columns(path)}
+
+
+def labelled_columns(path: Path | str) -> list[tuple[str, str, NDArray[np.float64]]]:
+    """Name, unit and values of each column of a history, also one that is still growing.
+
+    Args:
+        path: The file.
+
+    Raises:
+        ValueError: It is empty, or has something else than numbers.
+        OSError: It cannot be read.
+    """
     text = Path(path).read_text(encoding="utf-8")
-    complete = text[: text.rfind("\n") + 1]  # a run that was killed may leave half a row
-    header, *rows = csv.reader(complete.splitlines())
-    names = [label.split(" [")[0] for label in header]
-    values = np.array(rows, dtype=np.float64).reshape(-1, len(names))
-    return dict(zip(names, values.T, strict=True))
+    lines = text[: text.rfind("\n") + 1].splitlines()  # a run that was killed may leave half a row
+    if not lines:
+        raise ValueError("it is empty")
+    header, *rows = csv.reader(lines)
+    columns = np.array(rows, dtype=np.float64).reshape(-1, len(header)).T
+    named = [(*label.removesuffix("]").split(" ["), "")[:2] for label in header]
+    return [(name, unit, values) for (name, unit), values in zip(named, columns, strict=True)]
 
 
 def write_summary(path: Path | str, values: Mapping[str, Any], comm: MPI.Comm) -> None:
@@ -213,14 +226,14 @@ def claim_folder(folder: Path | str, comm: MPI.Comm, *, overwrite: bool = False,
             )
         for history in older:
             history.unlink()
-            history.with_name("summary.json").unlink(missing_ok=True)
+            history.with_name(SUMMARY).unlink(missing_ok=True)
             for fields in history.parent.glob("*.bp"):
                 shutil.rmtree(fields)
 
     on_root(comm, claim)
 
 
-def on_root(comm: MPI.Comm, action: Callable[[], None]) -> None:
+def on_root(comm: MPI.Comm, action: Callable[[], object]) -> None:
     """Run an action on the first rank; what it raises is raised on every rank. Collective.
 
     Args:

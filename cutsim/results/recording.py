@@ -20,7 +20,8 @@ from cutsim.base.terms import Columns, FacetShowing, offering
 from cutsim.base.units import Units
 from cutsim.results.checkpoints import Checkpoints, ended_together
 from cutsim.results.field_files import FieldWriter, Format
-from cutsim.results.output import HISTORY, HistoryWriter, claim_folder, first_rows, write_summary
+from cutsim.results.folder import HISTORY, SUMMARY
+from cutsim.results.output import HistoryWriter, claim_folder, first_rows, write_summary
 from cutsim.results.progress import Progress
 
 
@@ -165,7 +166,7 @@ class Recording:
             values: Headline numbers, beside those given before; see `cutsim.results.output.write_summary`.
         """
         self._values |= values or {}
-        write_summary(self.folder / "summary.json", self._summary(), self.problem.state.mesh.comm)
+        write_summary(self.folder / SUMMARY, self._summary(), self.problem.state.mesh.comm)
 
     def _summary(self) -> dict[str, Any]:
         state = self.problem.state
@@ -206,7 +207,7 @@ class Recording:
                 state.verdict.doubt("failed", f"ended at time {state.time_old:.6g} of {self._until:.6g} by {error!r}")
         summary = MPI.COMM_SELF if not together else state.mesh.comm
         if together or state.mesh.comm.rank == 0:
-            write_summary(self.folder / "summary.json", self._summary(), summary)
+            write_summary(self.folder / SUMMARY, self._summary(), summary)
         self._progress.say(f"{self._title}: {state.verdict}")
 
 

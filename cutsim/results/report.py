@@ -14,19 +14,15 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs
 
-from cutsim.results.output import replace_file
+from cutsim.base.files import replace_file
+from cutsim.results.folder import GIF, MP4, REPORT, SETUP, STAGES, has_checkpoint
 from cutsim.results.overlay import Overlay
 from cutsim.results.run_files import RunFiles
-from cutsim.results.stages import FOLDER, read_stages
+from cutsim.results.stages import read_stages
 from cutsim.results.turnable import view_json
 from cutsim.results.web_plots import columns_json, curves_json, energy_json, heat_json
 
 logger = logging.getLogger(__name__)
-
-#: Folder of the checkpoints in that of a run.
-CHECKPOINTS = "checkpoint"
-#: Name of the report in the folder of a run or of a sweep.
-NAME = "report.html"
 
 _TYPES = {".png": "image/png", ".gif": "image/gif", ".mp4": "video/mp4"}
 # entries of a summary that have a place of their own in a report
@@ -53,16 +49,16 @@ def write_report(folder: Path | str) -> Path:
     run = RunFiles.read(folder)
     missing = list(run.missing)
     stages = _attempt("stages", lambda: [stage.whole() for stage in read_stages(folder)], missing) or []
-    pictures = sorted((run.folder / FOLDER).glob("[0-9][0-9].png"))
+    pictures = sorted((run.folder / STAGES).glob("[0-9][0-9].png"))
     content = {
         "columns": columns_json(run.history) if run.curve else None,
         "energy": _attempt("energy audit", lambda: energy_json(run.history), missing),
         "view": _attempt("view that can be turned", lambda: view_json(stages), missing),
-        "setup": _embedded(_first(run.folder, "setup.png")),
-        "animation": _embedded(_first(run.folder, "animation.mp4", "animation.gif")),
+        "setup": _embedded(_first(run.folder, SETUP)),
+        "animation": _embedded(_first(run.folder, MP4, GIF)),
         "pictures": [_embedded(path) for path in pictures],
     }
-    resumable = not run.complete and any((run.folder / CHECKPOINTS).glob("*"))
+    resumable = not run.complete and has_checkpoint(run.folder)
     missing += [words for name, words in _MISSED.items() if not content[name]]
     numbers = {name: _number(value) for name, value in run.summary.items() if name not in _PLACED}
     content["heat"] = _attempt("audit of heat", lambda: heat_json(run.history), missing)
@@ -70,7 +66,7 @@ def write_report(folder: Path | str) -> Path:
         "run.html", run=run, tiles=tiles(run), sizes=dict(_sizes(run)), numbers=numbers, missing=missing,
         resumable=resumable, **content,
     )  # fmt: skip
-    return _written(run.folder / NAME, page)
+    return _written(run.folder / REPORT, page)
 
 
 #: What a report without some of its content says.
@@ -112,7 +108,7 @@ def write_sweep_report(folder: Path | str, runs: Mapping[Path, Mapping[str, Any]
         rows=rows,
         overlay=_overlaid(Overlay.of([run for run, _ in read], labels)),
     )
-    return _written(Path(folder) / NAME, page)
+    return _written(Path(folder) / REPORT, page)
 
 
 def tiles(run: RunFiles) -> dict[str, str]:
@@ -197,7 +193,7 @@ def _overlaid(overlay: Overlay | None) -> str | None:
 
 
 def _link(run: Path, folder: Path | str) -> str:
-    return Path(os.path.relpath(run / NAME, folder)).as_posix()
+    return Path(os.path.relpath(run / REPORT, folder)).as_posix()
 
 
 def _page(template: str, **content: Any) -> str:

@@ -1,6 +1,5 @@
 """What a run has left in its folder, read as far as it is there."""
 
-import csv
 import json
 import tomllib
 from collections.abc import Iterator, Mapping
@@ -13,6 +12,8 @@ import numpy as np
 
 from cutsim.base.arrays import Array
 from cutsim.base.terms import ENTRIES
+from cutsim.results.folder import CASE, HISTORY, SUMMARY
+from cutsim.results.output import labelled_columns
 
 # abscissae and ordinates of the main curve, the first that there are
 _ABSCISSAE = ("depth", "way", "opening", "deflection", "time")
@@ -96,9 +97,9 @@ class RunFiles:
             folder: The folder.
         """
         missing: list[str] = []
-        summary = _or_else({}, _summary, Path(folder) / "summary.json", missing)
-        history = _or_else({}, _history, Path(folder) / "history.csv", missing)
-        case = _or_else("", lambda path: path.read_text(encoding="utf-8"), Path(folder) / "case.toml", missing)
+        summary = _or_else({}, _summary, Path(folder) / SUMMARY, missing)
+        history = _or_else({}, _history, Path(folder) / HISTORY, missing)
+        case = _or_else("", lambda path: path.read_text(encoding="utf-8"), Path(folder) / CASE, missing)
         return cls(Path(folder), summary, history, case, tuple(missing))
 
     @property
@@ -195,14 +196,7 @@ def _summary(path: Path) -> Mapping[str, Any]:
 
 
 def _history(path: Path) -> Mapping[str, Column]:
-    text = path.read_text(encoding="utf-8")
-    lines = text[: text.rfind("\n") + 1].splitlines()  # a run that was killed may leave half a row
-    if not lines:
-        raise ValueError("it is empty")
-    header, *rows = csv.reader(lines)
-    columns = np.array(rows, dtype=np.float64).reshape(-1, len(header)).T
-    named = [(*label.removesuffix("]").split(" ["), "")[:2] for label in header]
-    return {name: Column(name, unit, values) for (name, unit), values in zip(named, columns, strict=True)}
+    return {name: Column(name, unit, values) for name, unit, values in labelled_columns(path)}
 
 
 def _or_else(otherwise: Any, read: Any, path: Path, missing: list[str]) -> Any:

@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
+from cutsim.analysis.stepping import Problem, StepReport
 from cutsim.base.checks import count, finite, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Bonded, FacetShowing, offering
 from cutsim.base.units import Units
 from cutsim.bodies.solid import Solid
+from cutsim.results.checkpoints import ended_together
+from cutsim.results.folder import STAGES
 from cutsim.results.grids import VonMises, gather_facets, gather_grid, library, part_numbers
 from cutsim.results.output import Closing, on_root
-from cutsim.results.stages import FOLDER, Skin, Stage
+from cutsim.results.stages import Skin, Stage
 from cutsim.results.tool_surfaces import ToolSurfaces, front
 
 if TYPE_CHECKING:
@@ -67,7 +69,7 @@ class Stages(Closing):
         require_number("until", until, finite)
         for plane in mirror:
             require("mirror", plane, plane in ("x", "y", "z"), "x, y or z")
-        self._folder, self._until, self._number = Path(folder) / FOLDER, until, number
+        self._folder, self._until, self._number = Path(folder) / STAGES, until, number
         self._state = problem.state
         self._scene = _Scene(problem, units or Units(), mirror)
         self._written, self._mark = problem.state.time_old, self._marks(problem.state.time_old)
@@ -90,8 +92,7 @@ class Stages(Closing):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        # only these ends are known to be met by all ranks
-        if kind is None or issubclass(kind, StepError | Interrupted):
+        if ended_together(kind):
             self.close()
 
     def _marks(self, time: float) -> int:

@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from cutsim.base.files import replace_file
 from cutsim.base.units import Units
+from cutsim.results.folder import STAGES
 
 if TYPE_CHECKING:
     import pyvista
 
 Floats = NDArray[np.float32]
-
-#: Folder of the stages in that of a run.
-FOLDER = "stages"
 
 # distance from a plane of symmetry that is none, over the size of the body
 _FLAT = 1e-6
@@ -185,7 +183,7 @@ def read_stages(folder: Path | str) -> list[Stage]:
         folder: Folder of the run.
     """
     found = {}
-    for path in sorted((Path(folder) / FOLDER).glob("*.npz")):
+    for path in sorted((Path(folder) / STAGES).glob("*.npz")):
         try:
             stage = Stage.read(path)
         except ValueError:

@@ -5,7 +5,8 @@ import json
 import numpy as np
 
 from cutsim.base.units import Units
-from cutsim.results.stages import FOLDER, Skin, Stage
+from cutsim.results.folder import STAGES
+from cutsim.results.stages import Skin, Stage
 
 HEADER = "step,time [s],depth [mm],force [N],work_external [mJ],energy_strain [mJ],energy_fracture [mJ],energy_closure"
 
@@ -37,4 +38,4 @@ def write_run(folder, until=2.0, rows=5, **summary):
     if summary:
         (folder / "summary.json").write_text(json.dumps({"time": 1.0, "until": until, "reasons": []} | summary))
     for i, time in enumerate((0.0, 0.5, 1.0)):
-        stage(time).write(folder / FOLDER / f"{i:03d}.npz")
+        stage(time).write(folder / STAGES / f"{i:03d}.npz")
