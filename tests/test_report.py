@@ -63,7 +63,7 @@ def test_page_has_the_numbers_and_needs_nothing_else(tmp_path):
     start = words.index("A cut </script> & more trusted The run is complete")  # behind the title of the window
     assert start < 60 and "largest force 3 N" in words and "at depth 1 mm" in words and "0.01 %" in words
     assert "Numbers without a unit are in mm, N, s, K" in words and "young 0.8 MPa" in words and "0.1*t" in words
-    assert "cells 77" in words and "gain 0.25" in words and "cutsim run case.toml -n 2" in words
+    assert "cells 77" in words and "gain 0.25" in words and "cutsim run case.toml -n 2 with cutsim 9.9 and" in words
     assert "Not in this report" not in words
     assert {address.partition(":")[0] for address in page.loaded} == {"data"}
     kinds = [address[5:].partition(";")[0] for address in page.loaded]

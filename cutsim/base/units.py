@@ -112,7 +112,6 @@ Conductivity = Annotated[float, Kind("conductivity")]
 Conductance = Annotated[float, Kind("conductance")]
 ConductancePerPressure = Annotated[float, Kind("conductance per pressure")]
 HeatCapacityPerArea = Annotated[float, Kind("heat capacity per area")]
-HeatSource = Annotated[float, Kind("heat source")]
 
 
 @dataclass(frozen=True)

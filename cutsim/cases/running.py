@@ -13,11 +13,11 @@ from typing import Any
 import dolfinx
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 
 import cutsim
 from cutsim.analysis.stepping import Interrupted, StepError, StepReport
 from cutsim.base.files import replace_file
+from cutsim.base.versions import mpi_version, petsc_version
 from cutsim.cases.building import Simulation
 from cutsim.cases.case import Case
 from cutsim.cases.document import places
@@ -214,8 +214,8 @@ def versions() -> dict[str, str]:
     return {
         "cutsim": cutsim.__version__,
         "dolfinx": dolfinx.__version__,
-        "PETSc": ".".join(map(str, PETSc.Sys.getVersion())),
-        "MPI": MPI.Get_library_version().splitlines()[0].strip("\0 ")[:60],
+        "PETSc": petsc_version(),
+        "MPI": mpi_version(),
         "Python": platform.python_version(),
         "system": platform.platform(),
     }

@@ -1,6 +1,5 @@
 """Schema of case files: the one place that knows their keys."""
 
-from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, ValidationInfo, ValidatorFunctionWrapHandler, field_validator
@@ -89,11 +88,6 @@ class Parts(Table):
         """Cohesive law of a crack, None for contact only, or of a layer."""
         own = "law" in part.model_fields_set if isinstance(part, Crack) else part.law is not None
         return part.law if own else self.law
-
-    @property
-    def all_bodies(self) -> Mapping[str, Body]:
-        """Bodies by name; if none is given one of all cells."""
-        return self.bodies or {"body": Body()}
 
 
 class CaseTables(Parts, Header):

@@ -3,7 +3,6 @@
 import numpy as np
 from dolfinx.mesh import Mesh
 
-from cutsim.base.units import Units
 from cutsim.cases.building import Simulation
 from cutsim.fields.sizes import global_range
 
@@ -17,10 +16,11 @@ def mesh_sizes(simulation: Simulation) -> dict[str, str | int | float]:
     sizes: dict[str, str | int | float] = {
         "cells": int(mesh.topology.index_map(mesh.topology.dim).size_global),
         "kind of cells": kind_of_cells(simulation),
-        _label("smallest element", units): smallest,
-        _label("largest element", units): largest,
+        units.label("smallest element", "length"): smallest,
+        units.label("largest element", "length"): largest,
     }
-    return sizes | {_label(f"elements along {name}", units): c.size for name, c in simulation.parts.cracks.items()}
+    cracks = simulation.parts.cracks.items()
+    return sizes | {units.label(f"elements along {name}", "length"): crack.size for name, crack in cracks}
 
 
 def kind_of_cells(simulation: Simulation) -> str:
@@ -34,7 +34,3 @@ def element_sizes(mesh: Mesh) -> tuple[float, float]:
     dim = mesh.topology.dim
     cells = np.arange(mesh.topology.index_map(dim).size_local, dtype=np.int32)
     return global_range(mesh.comm, mesh.h(dim, cells))
-
-
-def _label(words: str, units: Units) -> str:
-    return f"{words} [{units.of('length')}]"

@@ -26,9 +26,10 @@ _DISTRIBUTIONS = ("numpy", "scipy", "gmsh", "meshio", "pyvista", "h5py", "matplo
 _PROBES = {
     "dolfinx": "from mpi4py import MPI; import dolfinx; print(dolfinx.__version__, end='')\n"
     "print(', with ADIOS2' if dolfinx.has_adios2 else ', without ADIOS2: fields are written as VTU')",
-    "PETSc": "from petsc4py import PETSc; print('.'.join(map(str, PETSc.Sys.getVersion())), end='')\n"
-    "print('' if PETSc.ScalarType is float or PETSc.ScalarType(0).dtype == 'f8' else ', not in double precision')",
-    "MPI": "from mpi4py import MPI; print(MPI.Get_library_version().splitlines()[0].strip(chr(0)))",
+    "PETSc": "from cutsim.base.versions import petsc_version; print(petsc_version(), end='')\n"
+    "from petsc4py import PETSc; double = PETSc.ScalarType is float or PETSc.ScalarType(0).dtype == 'f8'\n"
+    "print('' if double else ', not in double precision')",
+    "MPI": "from cutsim.base.versions import mpi_version; print(mpi_version())",
     "pictures": "import ctypes; ctypes.CDLL('libEGL.so.1')\n"
     "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(32, 32)); p.add_mesh(pyvista.Sphere())\n"
     "p.screenshot(return_img=True); print('drawn off screen')",

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cutsim.base.files import replace_file
 from cutsim.commands.endings import Ending
 from cutsim.commands.jobs import Job
 from cutsim.commands.variation import Variant
@@ -101,6 +100,8 @@ class Statuses:
 
     def note(self, name: str, status: int) -> None:
         """Keep the exit status of a run."""
+        from cutsim.base.files import replace_file
+
         self._known[name] = status
         replace_file(self._path, (json.dumps(self._known, indent=2) + "\n").encode())
 

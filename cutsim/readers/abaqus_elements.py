@@ -72,13 +72,12 @@ class Elements:
         """
         found = []
         for block, rows in self._by_block(elements):
-            plain = block.shape.rstrip("0123456789")
             if label in _SIDES and shapes.dimension(block.shape) == 2:
                 found.append(shapes.corners(block.shape, block.nodes[rows]))
                 continue
-            known = _FACES.get(plain, [])
+            known = _FACES.get(shapes.plain(block.shape), [])
             numbers = range(len(known)) if not label else [int(label[1:]) - 1] if label[1:].isdecimal() else []
-            if plain in _FACES and not (label[:1] in ("", "S") and numbers and 0 <= numbers[0] < len(known)):
+            if known and not (label[:1] in ("", "S") and numbers and 0 <= numbers[0] < len(known)):
                 raise ValueError(f"elements of type {block.kind} have no face {label!r}")
             for number in numbers if known else []:
                 found.append(block.nodes[rows][:, known[number]])
@@ -100,9 +99,7 @@ class Elements:
     def _free(self, faces: Sequence[Indices]) -> list[Indices]:
         """Those of some faces that belong to one element of the model only."""
         everything = [
-            block.nodes[:, corners]
-            for block in self.blocks
-            for corners in _FACES.get(block.shape.rstrip("0123456789"), [])
+            block.nodes[:, corners] for block in self.blocks for corners in _FACES.get(shapes.plain(block.shape), [])
         ]
         # faces are the same if the sums of random numbers of their nodes are
         nodes = 1 + max((int(rows.max(initial=0)) for rows in everything), default=0)

@@ -31,18 +31,30 @@ _EDGES = {
 }  # fmt: skip
 _DIMENSIONS = {"line": 1, "triangle": 2, "quad": 2, "tetra": 3, "hexahedron": 3, "wedge": 3, "pyramid": 3}
 _OF_FEBIO = {"tri": 2, "tet": 3, "pyra": 3}
+_CORNERS = {
+    "line": 2, "tri": 3, "triangle": 3, "quad": 4, "tetra": 4, "tet": 4, "pyramid": 5, "pyra": 5, "wedge": 6,
+    "hexahedron": 8,
+}  # fmt: skip
 
 
 def count_of(shape: str) -> int:
     """Number of nodes of a cell or facet."""
-    linear = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6, "hexahedron": 8}
-    return linear.get(shape) or int(shape.lstrip("abcdefghijklmnopqrstuvwxyz"))
+    return _CORNERS.get(shape) or int(shape.lstrip("abcdefghijklmnopqrstuvwxyz"))
 
 
 def dimension(shape: str) -> int:
     """Dimension of a cell; 0 of what is no curve, face or volume."""
-    plain = shape.rstrip("0123456789")
-    return _DIMENSIONS.get(plain, _OF_FEBIO.get(plain, 0))
+    return _DIMENSIONS.get(plain(shape), _OF_FEBIO.get(plain(shape), 0))
+
+
+def plain(shape: str) -> str:
+    """Type of a cell or facet whatever its number of nodes."""
+    return shape.rstrip("0123456789")
+
+
+def quadratic(shape: str) -> bool:
+    """Whether a curve, face or volume has nodes between its corners."""
+    return dimension(shape) > 0 and count_of(shape) > _CORNERS[plain(shape)]
 
 
 def usable(shape: str) -> bool:
@@ -62,8 +74,7 @@ def instead(shape: str) -> str:
 
 def corners(shape: str, nodes: Indices) -> Indices:
     """The corners among the nodes of cells or facets, shape (cells, corners)."""
-    count = {"line": 2, "tri": 3, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
-    return nodes[:, : count[shape.rstrip("0123456789")]]
+    return nodes[:, : _CORNERS[plain(shape)]]
 
 
 def completed(shape: str, nodes: Indices, points: Floats) -> tuple[str, Indices, Floats]:

@@ -11,7 +11,7 @@ from cutsim.cases.importing.abaqus_file import AbaqusFile, Located
 from cutsim.cases.importing.abaqus_history import translate_steps
 from cutsim.cases.importing.counterparts import Counterpart, parameters, table
 from cutsim.cases.importing.draft import Imported, Untranslatable
-from cutsim.readers.shapes import dimension
+from cutsim.readers import shapes
 
 #: Keywords of geometry, of output and of what has no effect on the result.
 _READ_ELSEWHERE = (
@@ -20,7 +20,6 @@ _READ_ELSEWHERE = (
     "ENERGY OUTPUT", "RESTART", "NODE PRINT", "EL PRINT", "ENERGY PRINT", "CONTACT PRINT", "NODE FILE", "EL FILE",
     "CONTACT FILE", "FILE FORMAT", "MONITOR", "PRINT", "CONTROLS", "SECTION CONTROLS", "HOURGLASS STIFFNESS",
 )  # fmt: skip
-_QUADRATIC = ("tetra10", "hexahedron20", "hexahedron27", "triangle6", "quad8", "quad9")
 _BRICKS = ("hexahedron", "quad")
 
 
@@ -53,7 +52,7 @@ def import_abaqus(path: Path, mesh_file: str) -> Imported:
 
 def _mesh(file: AbaqusFile, mesh_file: str) -> int:
     """Translate the mesh; the dimension of it."""
-    dims = [dimension(block.shape) for block in file.mesh.blocks]
+    dims = [shapes.dimension(block.shape) for block in file.mesh.blocks]
     dim = 3 if 3 in dims else 2
     blocks = [block for block, of in zip(file.mesh.blocks, dims, strict=True) if of == dim]
     for block, of in zip(file.mesh.blocks, dims, strict=True):
@@ -61,7 +60,7 @@ def _mesh(file: AbaqusFile, mesh_file: str) -> int:
             file.draft.untranslated(block.line, f"*ELEMENT: {block.kind} in {block.name!r}: they are no solids")
     kinds = {block.kind for block in blocks}
     values: dict[str, object] = {"file": mesh_file, "dim": dim}
-    if any(block.shape in _QUADRATIC for block in blocks):
+    if any(shapes.quadratic(block.shape) for block in blocks):
         values["degree"] = 2
     if dim == 2 and all(kind.startswith("CAX") for kind in kinds):
         values["axisymmetric"] = True

@@ -4,14 +4,12 @@ from collections.abc import Iterator
 from typing import Any
 
 from cutsim.cases.importing.abaqus_file import AbaqusFile, Located
-from cutsim.cases.importing.counterparts import tie
+from cutsim.cases.importing.counterparts import STIFF, tie
 from cutsim.cases.importing.draft import Untranslatable
-from cutsim.cases.importing.surfaces import area_over_volume, mean_size
+from cutsim.cases.importing.surfaces import height_behind
 from cutsim.readers.abaqus_cards import Card
 
 _OPTIONS = ("FRICTION", "SURFACE BEHAVIOR")
-#: Stiffness of what is tied, in Young's modulus over the height of an element.
-_STIFF = 100.0
 
 
 def translate_contacts(file: AbaqusFile, young: float) -> None:
@@ -86,8 +84,7 @@ def _law(file: AbaqusFile, options: dict[str, Card]) -> dict[str, Any]:
 
 
 def _tie(file: AbaqusFile, card: Card, label: str, surfaces: dict[str, Any], young: float) -> None:
-    slave = surfaces["slave"]
-    height = 1 / (area_over_volume(file.mesh, slave) or 1 / mean_size(file.mesh, slave))
-    values = surfaces | {"law": tie(_STIFF * young / height, young), "small_sliding": True}
+    penalty = STIFF * young / height_behind(file.mesh, surfaces["slave"])
+    values = surfaces | {"law": tie(penalty, young), "small_sliding": True}
     file.draft.add("pairs", label, values, f"line {card.line}")
     file.draft.difference(card.line, "*TIE: tied by a stiff bond that does not break")

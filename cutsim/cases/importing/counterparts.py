@@ -1,10 +1,10 @@
 """Materials of other programs as ours, and how a case file says them."""
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
+from cutsim.cases.classes import kebab
 from cutsim.interface.cohesive import Bilinear
 from cutsim.materials.anisotropic import FungOrthotropic
 from cutsim.materials.elastic import IsochoricNeoHookean, Material, NeoHookean, StVenantKirchhoff
@@ -18,6 +18,8 @@ UNCOUPLED = (ArrudaBoyce, FungOrthotropic, IsochoricNeoHookean, IsochoricOgden, 
 _MODULI = ("c1", "c2", "c3", "modulus", "moduli")
 #: Strength of what is tied, in Young's modulus; no rubber-like body reaches it.
 _STRONG = 50.0
+#: Stiffness of what is tied and has no penalty of its own, in Young's modulus over the height of an element.
+STIFF = 100.0
 
 
 @dataclass(frozen=True)
@@ -89,11 +91,6 @@ def parameters(thing: Any) -> dict[str, Any]:
     """Parameters of a dataclass that are not the default."""
     given = {f.name: getattr(thing, f.name) for f in fields(thing) if getattr(thing, f.name) != f.default}
     return {name: _plain(value) for name, value in given.items()}
-
-
-def kebab(name: str) -> str:
-    """Name of a class as a case file writes it: ``NeoHookean`` is ``neo-hookean``."""
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "-", name).lower()
 
 
 def _plain(value: Any) -> Any:

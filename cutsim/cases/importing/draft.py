@@ -9,6 +9,8 @@ from typing import Any
 import tomlkit
 from tomlkit.items import InlineTable, Table
 
+from cutsim.readers.mesh_data import free_name
+
 #: Length of a line of a comment.
 _WIDTH = 120
 #: Keys that have a table of their own even if it is short.
@@ -110,11 +112,7 @@ class Draft:
             The name that it gets: the given one without what bare keys may not have, and numbered if it is taken.
         """
         entries = self.tables.setdefault(section, {})
-        free = plain = re.sub(r"\W+", "_", name).strip("_") or section.rstrip("s")
-        number = 1
-        while free in entries:
-            number += 1
-            free = f"{plain}_{number}"
+        free = free_name(entries, re.sub(r"\W+", "_", name).strip("_") or section.rstrip("s"))
         entries[free] = dict(values)
         self._remark((section, free), comment)
         return free

@@ -13,7 +13,8 @@ from cutsim.cases.importing.febio_rigid import rigid_bodies, translate_fastened
 from cutsim.cases.importing.febio_steps import translate_steps
 from cutsim.cases.importing.febio_supports import translate_supports
 from cutsim.readers.febio import read_febio
-from cutsim.readers.shapes import dimension
+from cutsim.readers.mesh_data import MeshData
+from cutsim.readers.shapes import dimension, quadratic
 from cutsim.readers.xml_tree import LinedElement
 
 _RIGID = "rigid body"
@@ -21,7 +22,6 @@ _UNITS = {"mm-N-s": ("mm", "N"), "SI": ("m", "N")}
 #: Elements that FEBio integrates in other ways than ours.
 _OTHER_ELEMENTS = ("ut4-solid", "ut4", "udg-hex", "sri-solid", "remodelling-solid")
 _SPACE = 3
-_QUADRATIC = ("tetra10", "hexahedron20", "hexahedron27", "wedge15")
 #: Sections that the mesh is read from, or that say what is written.
 _READ_ELSEWHERE = ("Mesh", "Geometry", "Output", "Globals", "Module")
 
@@ -46,7 +46,7 @@ def import_febio(path: Path, mesh_file: str) -> Imported:
         if section.tag in _READ_ELSEWHERE:
             file.read_all(section)
     _header(file, draft)
-    context = Context(file, draft, mesh, quadratic=any(block.shape in _QUADRATIC for block in mesh.blocks))
+    context = Context(file, draft, mesh, quadratic=_quadratic(mesh))
     translate_steps(file, draft)
     _Model(context, mesh_file).translate()
     for element in file.leftovers():
@@ -54,6 +54,11 @@ def import_febio(path: Path, mesh_file: str) -> Imported:
         why = "nothing that is translated uses it" if unused else "has no counterpart"
         draft.untranslated(element.line, f"{describe(element)}: {why}")
     return draft.finished()
+
+
+def _quadratic(mesh: MeshData) -> bool:
+    """Whether solids have nodes between their corners."""
+    return any(dimension(block.shape) == _SPACE and quadratic(block.shape) for block in mesh.blocks)
 
 
 def _header(file: FebioFile, draft: Draft) -> None:

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cutsim.cases.importing.counterparts import rounded, tie
+from cutsim.cases.importing.counterparts import STIFF, rounded, tie
 from cutsim.cases.importing.draft import MalformedFile, Untranslatable
 from cutsim.cases.importing.febio_context import Context, describe
 from cutsim.cases.importing.febio_file import children
 from cutsim.cases.importing.febio_rigid import RigidBody
-from cutsim.cases.importing.surfaces import area_over_volume, mean_size, obj_text, outer_triangles
+from cutsim.cases.importing.surfaces import height_behind, mean_size, obj_text, outer_triangles
 from cutsim.readers.xml_tree import LinedElement
 
 _OFF = ("", "0", "false", "penalty")
@@ -42,8 +42,6 @@ _NEUTRAL: Mapping[str, tuple[str, ...]] = MappingProxyType(
 _PENETRATION = 0.01
 #: Least penalty of a contact that is augmented, in Young's modulus over the height of an element.
 _AUGMENTED = 10.0
-#: Stiffness of what is tied without a tolerance, in Young's modulus over the height of an element.
-_STIFF = 100.0
 
 
 def translate_contacts(context: Context, bodies: Mapping[str, RigidBody], young: Mapping[str, float]) -> None:
@@ -161,8 +159,7 @@ def _penalty(context: Context, element: LinedElement, surface: str, young: Mappi
 
 def _reference(context: Context, surface: str, young: Mapping[str, float]) -> float:
     """Young's modulus over the height of the elements behind a surface [stress/length]."""
-    height = 1 / (area_over_volume(context.mesh, surface) or 1 / mean_size(context.mesh, surface))
-    return max(young.values(), default=1.0) / height
+    return max(young.values(), default=1.0) / height_behind(context.mesh, surface)
 
 
 def _pair(context: Context, element: LinedElement, surfaces: tuple[str, str], young: Mapping[str, float]) -> None:
@@ -179,7 +176,7 @@ def _tie(context: Context, element: LinedElement, surfaces: tuple[str, str], you
     penalty = _penalty(context, element, surfaces[0], young)
     for tag in ("two_pass", "gaptol"):
         context.file.child(element, tag)
-    penalty = _STIFF * _reference(context, surfaces[0], young) if augmented else penalty
+    penalty = STIFF * _reference(context, surfaces[0], young) if augmented else penalty
     law = tie(penalty, max(young.values(), default=1.0))
     values = {"slave": surfaces[0], "master": surfaces[1], "law": law, "small_sliding": True}
     context.draft.add("pairs", element.get("name") or "tied", values, f"line {element.line}")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cutsim.base.arrays import Array
 from cutsim.cases.importing.draft import Draft, MalformedFile, Untranslatable
 from cutsim.cases.importing.febio_file import FebioFile
-from cutsim.readers.mesh_data import MeshData
+from cutsim.readers.mesh_data import MeshData, Numbering
 from cutsim.readers.xml_tree import LinedElement
 
 AXES = "xyz"
@@ -48,13 +48,10 @@ class Context:
         Raises:
             MalformedFile: There is no such node.
         """
-        wanted = np.array(list(numbers), dtype=np.int64)
-        order = np.argsort(self.mesh.numbers)
-        near = np.searchsorted(self.mesh.numbers, wanted, sorter=order).clip(max=len(order) - 1)
-        found = order[near]
-        if (lost := wanted[self.mesh.numbers[found] != wanted]).size:
-            raise MalformedFile(f"{self.file.place(element)}: <{element.tag}>: there is no node {lost[0]}")
-        return found
+        try:
+            return Numbering(self.mesh.numbers, "node").rows(np.array(list(numbers), dtype=np.int64))
+        except ValueError as error:
+            raise MalformedFile(f"{self.file.place(element)}: <{element.tag}>: {error}") from None
 
     def nodes_of(self, parts: Iterable[str]) -> NDArray[np.int64]:
         """Rows of the nodes of some parts."""

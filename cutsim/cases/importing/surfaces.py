@@ -1,13 +1,13 @@
 """Surfaces of parts of a mesh, as tools need them."""
 
-from collections import Counter
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cutsim.base.arrays import Array
-from cutsim.readers.mesh_data import MeshData
+from cutsim.readers.facets import rows_in
+from cutsim.readers.mesh_data import Block, Indices, MeshData
+from cutsim.readers.shapes import dimension, plain
 
 # outward facets by the corners of a cell, as meshio calls it
 _FACETS: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -18,14 +18,14 @@ _FACETS: dict[str, tuple[tuple[int, ...], ...]] = {
     "triangle": ((0, 1, 2),),
     "quad": ((0, 1, 2, 3),),
 }
-
-
 # volume of a cell over its facet times the distance of their middles
 _FILL = {"tetra": 4 / 3, "pyramid": 4 / 3}
 _PRISM = 2.0
+_SPACE = 3
+_NONE: Indices = np.empty((0, 4), dtype=np.int64)
 
 
-def outer_triangles(mesh: MeshData, parts: Iterable[str]) -> NDArray[np.int64] | None:
+def outer_triangles(mesh: MeshData, parts: Iterable[str]) -> Indices | None:
     """Triangles of the outer surface of some parts, or None if it is not closed.
 
     Args:
@@ -35,21 +35,21 @@ def outer_triangles(mesh: MeshData, parts: Iterable[str]) -> NDArray[np.int64] |
     Returns:
         Rows of their corners in the points of the mesh, shape (triangles, 3).
     """
-    wanted, facets = set(parts), []
-    for block in mesh.blocks:
-        kind = "".join(c for c in block.shape if not c.isdigit())
-        if block.name in wanted and kind in _FACETS:
-            facets += [
-                facet for nodes in block.nodes for facet in (tuple(nodes[list(f)].tolist()) for f in _FACETS[kind])
-            ]
-    keys = [tuple(sorted(facet)) for facet in facets]
-    count = Counter(keys)
-    outer = [facet for facet, key in zip(facets, keys, strict=True) if count[key] == 1]
-    triangles = np.array([t for f in outer for t in ([f] if len(f) == 3 else [f[:3], (f[0], *f[2:])])], dtype=np.int64)
+    wanted = set(parts)
+    facets = np.concatenate([_NONE, *(_facets(block) for block in mesh.blocks if block.name in wanted)])
+    _, first, count = np.unique(np.sort(facets, axis=1), axis=0, return_index=True, return_counts=True)
+    outer = facets[np.sort(first[count == 1])]
+    triangles = np.concatenate([outer[:, :3], outer[outer[:, 3] >= 0][:, [0, 2, 3]]])
     return triangles if _closed(triangles) else None
 
 
-def _closed(triangles: NDArray[np.int64]) -> bool:
+def _facets(block: Block) -> Indices:
+    """Corners of the facets of each element, shape (facets, 4); of a triangle the last one is −1."""
+    rows = [block.nodes[:, list(facet)] for facet in _FACETS.get(plain(block.shape), ())]
+    return np.concatenate([_NONE, *(np.pad(row, ((0, 0), (0, 4 - row.shape[1])), constant_values=-1) for row in rows)])
+
+
+def _closed(triangles: Indices) -> bool:
     """Whether each edge belongs to two triangles."""
     if not len(triangles):
         return False
@@ -57,7 +57,7 @@ def _closed(triangles: NDArray[np.int64]) -> bool:
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
-def obj_text(points: Array, triangles: NDArray[np.int64]) -> str:
+def obj_text(points: Array, triangles: Indices) -> str:
     """A surface as text of an OBJ file."""
     used, numbers = np.unique(triangles, return_inverse=True)
     lines = [f"v {x:.12g} {y:.12g} {z:.12g}" for x, y, z in points[used]]
@@ -74,27 +74,24 @@ def mean_size(mesh: MeshData, surface: str) -> float:
     return float(np.concatenate(lengths).mean()) if lengths else 1.0
 
 
-def area_over_volume(mesh: MeshData, surface: str) -> float:
-    """Mean over the facets of a set of their area over the volume of their cells [1/length]; 0 if it has no cells.
+def height_behind(mesh: MeshData, surface: str) -> float:
+    """Height of the elements behind the facets of a set, as if they were bricks [length].
 
-    It is the inverse of the height of bricks on them.
+    It is the volume of an element over the area of its facet, the inverse of which is averaged; that of facets without
+    elements is their size.
     """
-    found = [ratio for facets in mesh.facet_sets[surface] for ratio in _ratios(mesh, facets)]
-    return float(np.mean(found)) if found else 0.0
+    found = np.concatenate([np.empty(0), *(_ratios(mesh, facets) for facets in mesh.facet_sets[surface])])
+    return float(1 / found.mean()) if len(found) else mean_size(mesh, surface)
 
 
-def _ratios(mesh: MeshData, facets: NDArray[np.int64]) -> list[float]:
-    middles = {tuple(sorted(facet)): mesh.points[facet].mean(axis=0) for facet in facets.tolist()}
-    nodes, ratios = np.unique(facets), []
-    for block in mesh.blocks:
-        kind = "".join(c for c in block.shape if not c.isdigit())
-        near = np.isin(block.nodes, nodes).sum(axis=1) >= facets.shape[1]
-        for cell in block.nodes[near] if kind in _FACETS and kind not in ("triangle", "quad") else ():
-            own = [middles.get(tuple(sorted(cell[list(f)].tolist()))) for f in _FACETS[kind]]
-            centre = mesh.points[cell].mean(axis=0)
-            ratios += [
-                1 / (_FILL.get(kind, _PRISM) * float(np.linalg.norm(middle - centre)))
-                for middle in own
-                if middle is not None
-            ]
-    return ratios
+def _ratios(mesh: MeshData, facets: Indices) -> Array:
+    """Area over volume of the elements on some facets [1/length]."""
+    wanted, nodes, found = np.sort(facets, axis=1), np.unique(facets), [np.empty(0)]
+    for block in (block for block in mesh.blocks if dimension(block.shape) == _SPACE):
+        kind = plain(block.shape)
+        near = block.nodes[np.isin(block.nodes, nodes).sum(axis=1) >= facets.shape[1]]
+        for local in (list(facet) for facet in _FACETS.get(kind, ()) if len(facet) == facets.shape[1]):
+            behind = near[rows_in(np.sort(near[:, local], axis=1), wanted)]
+            across = mesh.points[behind[:, local]].mean(axis=1) - mesh.points[behind].mean(axis=1)
+            found.append(1 / (_FILL.get(kind, _PRISM) * np.linalg.norm(across, axis=1)))
+    return np.concatenate(found)
