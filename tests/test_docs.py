@@ -256,3 +256,10 @@ def test_case_of_the_page_on_case_files(tmp_path):
     case = read_case(path)
     assert case.tools["tool"].made.tip_radius == 0.05 and case.mesh.set["band"] == 0.4
     assert set(re.search(r"the functions `([\w\s]+)`", page)[1].split()) == set(FUNCTIONS)
+
+
+def test_readme_has_the_case_that_it_names():
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    case = DOCS.parent / "demos" / "split.toml"
+    assert f"```toml\n{case.read_text(encoding='utf-8')}```" in text
+    assert read_case(case).title == "Splitting a notched block"
