@@ -134,15 +134,14 @@ def read_source(path: Path, x: str | None = None, y: str | None = None, width: f
     return Source(label, abscissae, ordinates, run.judgement.grade, run.complete)
 
 
-def per_width(force: Column, width: float, length: str = "mm") -> Column:
+def per_width(force: Column, width: float) -> Column:
     """A force per width, as that of plane problems.
 
     Args:
         force: The force.
-        width: The width.
-        length: Its unit.
+        width: The width [mm].
     """
-    return replace(force, unit=f"{force.unit}/{length}", values=force.values / width)
+    return replace(force, unit=f"{force.unit}/mm", values=force.values / width)
 
 
 def read_sources(

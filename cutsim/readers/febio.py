@@ -26,7 +26,8 @@ _FACES_OF_VTK = [*range(20), 23, 21, 20, 22, 24, 25, 26]
 # corners of facets by the start of their name
 _CORNERS = {"tri": 3, "quad": 4}
 _LINES = {"line2": 2, "line3": 3, "delem": 2}
-_SIDES = {"slave": "primary", "master": "secondary"}
+#: What older files call the surfaces of a pair, and what newer ones call them.
+SIDES = {"slave": "primary", "master": "secondary"}
 _LARGEST = 2**62
 
 
@@ -289,8 +290,7 @@ class _Reader:
         self._facet_sets[name] = tuple(np.concatenate(rows) for rows in found.values())
 
     def _read_pair(self, element: LinedElement) -> None:
-        # primary and secondary were called slave and master
-        sides = {_SIDES.get(side.tag, side.tag): side.get("surface", _text(side)).strip() for side in _lined(element)}
+        sides = {SIDES.get(side.tag, side.tag): side.get("surface", _text(side)).strip() for side in _lined(element)}
         for side in ("primary", "secondary"):
             if sides.get(side) not in self._facet_sets:
                 raise ValueError(f"{element.place}: <SurfacePair>: there is no <Surface> {sides.get(side)!r} ({side})")

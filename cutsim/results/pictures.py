@@ -24,7 +24,7 @@ from cutsim.base.signatures import checked
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
 from cutsim.results.grids import VonMises, gather_facets, gather_grid
-from cutsim.results.scene import ASIDE, DAMAGE, STRESS, Scene, View, corners, sharp_edges
+from cutsim.results.scene import DAMAGE, STRESS, Scene, View, corners, sharp_edges
 from cutsim.results.sheet import SCENE, SIZE, Bar, Entry, compose
 from cutsim.results.stages import Skin, Stage
 
@@ -181,9 +181,7 @@ class Look:
         return content.figure(self._view(stage), title=title, length=stage.units.length, dpi=dpi)
 
     def _view(self, stage: Stage) -> View:
-        right, up = np.asarray(stage.right), np.asarray(stage.up)
-        back = np.cross(right, up)
-        return View(self.shown, back if stage.flat else ASIDE @ np.stack([right, up, back]), up)
+        return View.of(self.shown, stage.right, stage.up, flat=stage.flat)
 
 
 def polydata(skin: Skin) -> pyvista.PolyData:

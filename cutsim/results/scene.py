@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from matplotlib.colors import Colormap, LinearSegmentedColormap
@@ -25,7 +25,9 @@ ASIDE = np.array([1.0, 0.7, 1.6])
 #: Colours of stress.
 STRESS = "viridis"
 
-_LINE = "#20242a"
+#: Colours of edges and of rigid tools.
+LINE, TOOL = "#20242a", "#a3adb8"
+
 # part of the picture that the body takes, in the direction in which it is larger
 _FILLED = 0.92
 # light on a body: in a plane problem its colours are exactly those of the bar
@@ -50,6 +52,19 @@ class View:
     shown: Array
     towards: ArrayLike
     up: ArrayLike
+
+    @classmethod
+    def of(cls, shown: Array, right: Sequence[float], up: Sequence[float], *, flat: bool) -> Self:
+        """View of what is flat from the front, of all else from aside.
+
+        Args:
+            shown: Points that are to be seen, shape (points, 3) [length].
+            right: Direction to the right where it is seen from the front.
+            up: Direction that points up.
+            flat: Whether it is flat.
+        """
+        back = np.cross(right, up)
+        return cls(shown, back if flat else ASIDE @ np.stack([right, up, back]), up)
 
     def aim(self, camera: Any, aspect: float) -> float:
         """Aim a camera so that the points fill the picture; returns the height that is seen [length].
@@ -105,7 +120,7 @@ class Scene:
     ) -> None:
         """Add a body coloured by a field, with or without the edges of its cells."""
         self._plotter.add_mesh(
-            surface, scalars=scalars, cmap=colours, clim=limits, show_edges=edges, edge_color=_LINE, edge_opacity=0.25,
+            surface, scalars=scalars, cmap=colours, clim=limits, show_edges=edges, edge_color=LINE, edge_opacity=0.25,
             line_width=self._width, lighting=not self._flat, **_FLAT if self._flat else _LIT,
             smooth_shading=not self._flat, split_sharp_edges=not self._flat, show_scalar_bar=False, opacity=opacity,
         )  # fmt: skip
@@ -113,7 +128,7 @@ class Scene:
     def add_lines(self, lines: pyvista.DataSet) -> None:
         """Add edges of a body."""
         if lines.n_cells:
-            self._plotter.add_mesh(lines, color=_LINE, line_width=2 * self._width, lighting=False)
+            self._plotter.add_mesh(lines, color=LINE, line_width=2 * self._width, lighting=False)
 
     def add_crack(self, faces: pyvista.DataSet) -> None:
         """Add faces of a crack, coloured by their ``damage``."""
@@ -138,7 +153,7 @@ class Scene:
     def add_tool(self, tool: pyvista.PolyData) -> None:
         """Add rigid tools."""
         self._plotter.add_mesh(
-            tool, color="#a3adb8", opacity=0.45, specular=1.0, specular_power=15, smooth_shading=not self._flat,
+            tool, color=TOOL, opacity=0.45, specular=1.0, specular_power=15, smooth_shading=not self._flat,
             split_sharp_edges=not self._flat, lighting=not self._flat,
         )  # fmt: skip
 

@@ -27,7 +27,7 @@ from cutsim.fields.state import State
 from cutsim.results.grids import gather_facets, gather_grid, part_numbers
 from cutsim.results.pictures import part_colours, part_entries, pixels_per_inch, save
 from cutsim.results.plots import distinct
-from cutsim.results.scene import ASIDE, Scene, View, sharp_edges
+from cutsim.results.scene import TOOL, Scene, View, sharp_edges
 from cutsim.results.sheet import SCENE, SIZE, Entry, compose
 from cutsim.results.tool_surfaces import ToolSurfaces, front
 
@@ -38,7 +38,6 @@ logger = logging.getLogger(__name__)
 
 # diameter of the largest mark of a node [pixels]; where several are on one node, later ones are smaller
 _MARK, _SMALLER = 15.0, 3.0
-_TOOL = "#a3adb8"
 
 
 @checked
@@ -100,7 +99,7 @@ class _Setup:
                 entries.append(Entry(name, colour, "point"))
             if self.tools is not None:
                 scene.add_tool(self.tools)
-                entries.append(Entry("tool", _TOOL))
+                entries.append(Entry("tool", TOOL))
             pixels, seen = scene.shot(self._view(directions, flat))
         return compose(pixels, seen, [], entries, title=title, length=units.length)
 
@@ -112,10 +111,8 @@ class _Setup:
         scene.add_lines(sharp_edges(surface))
 
     def _view(self, directions: dict[str, tuple[float, ...]], flat: bool) -> View:
-        right, up = (np.array(directions.get(key, axis)) for key, axis in {"right": (1, 0, 0), "up": (0, 1, 0)}.items())
-        back = np.cross(right, up)
         shown = np.vstack([mesh.points for mesh in (self.grid, self.tools) if mesh is not None])
-        return View(shown, back if flat else ASIDE @ np.stack([right, up, back]), up)
+        return View.of(shown, directions.get("right", (1, 0, 0)), directions.get("up", (0, 1, 0)), flat=flat)
 
 
 def _marked(problem: Problem, supports: Sequence[Support]) -> dict[str, NDArray[np.int32]]:

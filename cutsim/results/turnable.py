@@ -11,7 +11,7 @@ from matplotlib.colors import Colormap, to_hex
 
 from cutsim.base.arrays import Array
 from cutsim.results.pictures import Look, polydata
-from cutsim.results.scene import ASIDE, DAMAGE, STRESS, corners, sharp_edges
+from cutsim.results.scene import ASIDE, DAMAGE, LINE, STRESS, corners, sharp_edges
 from cutsim.results.stages import Skin, Stage, spread
 from cutsim.results.web_plots import LAYOUT, in_page
 
@@ -21,7 +21,7 @@ VIEWED = 5
 _TRIANGLES = 250_000
 _PLANE = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0}
 _SPACE = {"ambient": 0.75, "diffuse": 0.4, "specular": 0.02, "roughness": 0.9}
-_TOOL, _LINE = "#8d99a6", "#20242a"
+_TOOL = "#8d99a6"
 # distance of the eye, over the largest extent of the scene: all of it is before the eye
 _FAR = 2.0
 # least thickness of the scene, over its largest extent
@@ -100,7 +100,7 @@ def _lines(stage: Stage) -> Any:
     """Sharp and outer edges of the body."""
     edges = sharp_edges(polydata(stage.body))
     cells = edges.lines.reshape(-1, 3)[:, 1:] if edges.n_cells else np.zeros((0, 2), int)
-    line = {"color": _LINE, "width": 2}
+    line = {"color": LINE, "width": 2}
     return go.Scatter3d(**_segments(edges.points, cells, float(stage.flat)), line=line, hoverinfo="skip")
 
 

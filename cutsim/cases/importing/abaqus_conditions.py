@@ -32,7 +32,7 @@ class Conditions:
     def __init__(self, file: AbaqusFile, steps: list[Step], dim: int) -> None:
         self._file, self._steps, self._dim = file, steps, dim
         self._amplitudes = Amplitudes(file)
-        self._supports: dict[tuple[str, str, int], History] = {}
+        self._supports: dict[tuple[str, Any, int], History] = {}
         self._loads: dict[tuple[Any, ...], History] = {}
         self._comments: dict[tuple[Any, ...], str] = {}
 
@@ -66,13 +66,13 @@ class Conditions:
         if released and self._supports.keys() - named:
             raise Untranslatable("OP=NEW: what is held before is not released here", card.line)
 
-    def _nodes(self, wanted: str, part: str, line: int) -> tuple[str, str]:
+    def _nodes(self, wanted: str, part: str, line: int) -> tuple[str, Any]:
         """Key and value of the case file for a node or a set of nodes; a node is given by its position."""
         if wanted.isdecimal():
             found = (self._file.mesh.numbers == int(wanted)).nonzero()[0]
             if len(found) != 1:
                 raise ValueError(f"there is no node {wanted}, or more than one")
-            return "points", repr(self._file.mesh.points[found[0]][: self._dim].tolist())
+            return "points", tuple(self._file.mesh.points[found[0]][: self._dim].tolist())
         names = self._file.find(self._file.mesh.node_sets, wanted, part)
         if not names:
             raise ValueError(f"there is no set of nodes {wanted!r}")
@@ -183,19 +183,19 @@ class Conditions:
 
 
 def _together(
-    histories: Mapping[tuple[str, str, Any], History],
-) -> Iterator[tuple[tuple[str, list[str], Any], History]]:
+    histories: Mapping[tuple[str, Any, Any], History],
+) -> Iterator[tuple[tuple[str, list[Any], Any], History]]:
     """Conditions on nodes, those of single nodes that are the same at all times as one."""
-    found: dict[tuple[Any, ...], tuple[tuple[str, list[str], Any], History]] = {}
+    found: dict[tuple[Any, ...], tuple[tuple[str, list[Any], Any], History]] = {}
     for (key, where, what), history in histories.items():
         alike = (what, *history.times, *history.values) if key == "points" else where
         found.setdefault((key, what, alike), ((key, [], what), history))[0][1].append(where)
     yield from found.values()
 
 
-def _places(key: str, where: list[str]) -> Any:
+def _places(key: str, where: list[Any]) -> Any:
     """Value of the case file for nodes: positions, or the name of a set."""
-    return [_point(text) for text in where] if key == "points" else where[0]
+    return [list(point) for point in where] if key == "points" else where[0]
 
 
 def _held(entries: list[str], line: int) -> Iterator[tuple[int, float]]:
@@ -212,7 +212,3 @@ def _held(entries: list[str], line: int) -> Iterator[tuple[int, float]]:
         raise Untranslatable(f"degree of freedom {last}", line)
     value = real(entries[3]) if len(entries) > 3 else 0.0
     yield from ((dof, value) for dof in range(first, last + 1))
-
-
-def _point(text: str) -> list[float]:
-    return [float(c) for c in text.strip("[]").split(",")]

@@ -13,6 +13,8 @@ from cutsim.cases.importing.febio_context import Context, describe
 from cutsim.cases.importing.febio_file import children
 from cutsim.cases.importing.febio_rigid import RigidBody
 from cutsim.cases.importing.surfaces import height_behind, mean_size, obj_text, outer_triangles
+from cutsim.readers.facets import rows_in
+from cutsim.readers.febio import SIDES
 from cutsim.readers.xml_tree import LinedElement
 
 _OFF = ("", "0", "false", "penalty")
@@ -88,11 +90,9 @@ def _contact(
 
 
 def _share_facets(context: Context, one: str, other: str) -> bool:
-    keys = [
-        {tuple(sorted(facet)) for facets in context.mesh.facet_sets[name] for facet in facets.tolist()}
-        for name in (one, other)
-    ]
-    return bool(keys[0] & keys[1])
+    sets = context.mesh.facet_sets
+    pairs = [(a, b) for a in sets[one] for b in sets[other] if a.shape[1] == b.shape[1]]
+    return any(bool(rows_in(np.sort(a, axis=1), np.sort(b, axis=1)).any()) for a, b in pairs)
 
 
 def _within(context: Context, surface: str, nodes: NDArray[np.int64]) -> bool:
@@ -110,9 +110,7 @@ def _surfaces(context: Context, element: LinedElement) -> tuple[str, str]:
     for child in children(element):
         if child.tag == "surface":
             context.file.read(child)
-            found[{"slave": "primary", "master": "secondary"}.get(child.get("type", ""), child.get("type"))] = (
-                child.get("set")
-            )
+            found[SIDES.get(child.get("type", ""), child.get("type"))] = child.get("set")
     names = found.get("primary"), found.get("secondary")
     if not all(name in context.mesh.facet_sets for name in names):
         raise Untranslatable("its surfaces have no names", element.line)

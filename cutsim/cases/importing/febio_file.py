@@ -148,19 +148,18 @@ class FebioFile:
             raise MalformedFile(f"{self.place(holder)}: <{holder.tag}> has {len(numbers)} numbers in place of {length}")
         return numbers
 
-    def timed(self, element: LinedElement, scale: float = 1.0) -> Timed:
+    def timed(self, element: LinedElement) -> Timed:
         """Number of an element times its load curve, if it has one.
 
         Args:
             element: It has the number, and the number of the curve as attribute.
-            scale: Further factor.
 
         Raises:
             Untranslatable: It varies in space, or the curve has no counterpart.
         """
         self.read(element)
         number = self._numbers(element, element.tag, element.text)[0] if (element.text or "").strip() else 1.0
-        return Timed(scale * number, self.curve(element))
+        return Timed(number, self.curve(element))
 
     def timed_child(self, element: LinedElement, tag: str) -> Timed:
         """The same for a child.

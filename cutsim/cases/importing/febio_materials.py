@@ -119,7 +119,12 @@ class MaterialReader:
         return Counterpart(material, prony)
 
     def axes(self, element: LinedElement) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """First and second material axis."""
+        """First and second material axis.
+
+        Raises:
+            Untranslatable: They are not given by vectors.
+            MalformedFile: The vectors are parallel.
+        """
         given = self._file.child(element, "mat_axis")
         if given is None:
             return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
@@ -132,7 +137,11 @@ class MaterialReader:
         return tuple(a.tolist()), tuple((second / np.linalg.norm(second)).tolist())
 
     def fibre_direction(self, element: LinedElement) -> tuple[float, ...]:
-        """Direction of a family of fibres."""
+        """Direction of a family of fibres.
+
+        Raises:
+            Untranslatable: It has axes of its own, or is given neither by a vector nor by angles.
+        """
         if self._file.child(element, "mat_axis") is not None:
             raise Untranslatable("fibres in axes of their own", element.line)
         fiber = self._file.child(element, "fiber")
@@ -144,11 +153,7 @@ class MaterialReader:
             return cos(theta) * sin(phi), sin(theta) * sin(phi), cos(phi)
         if fiber.get("type") != "vector":
             raise Untranslatable(f"fibre direction of type {fiber.get('type')!r}", fiber.line)
-        return (
-            self._file.vector(fiber)
-            if fiber.get("type") == "vector" and not len(fiber)
-            else self._file.vector(fiber, "vector")
-        )
+        return self._file.vector(fiber, "vector") if len(fiber) else self._file.vector(fiber)
 
     def parts(self, element: LinedElement) -> tuple[list[LinedElement], list[LinedElement]]:
         """Solids of a mixture, and those of them that are fibres."""
@@ -161,7 +166,11 @@ class MaterialReader:
         return [solid for solid in solids if solid not in fibres], fibres
 
     def mixture(self, element: LinedElement, bulk: float, family: Callable[[LinedElement], FibreLaw]) -> Material:
-        """One solid with fibres in it."""
+        """One solid with fibres in it.
+
+        Raises:
+            Untranslatable: There is not one solid beside the fibres, or the mixture has axes of its own.
+        """
         solids, fibres = self.parts(element)
         if self._file.child(element, "mat_axis") is not None:
             raise Untranslatable("a mixture in axes of its own", element.line)
@@ -176,7 +185,11 @@ class MaterialReader:
         return ExponentialFibres(self.fibre_direction(element), modulus, exponential, power)
 
     def isochoric_fibres(self, element: LinedElement) -> FibreLaw:
-        """Family of fibres by their isochoric stretch."""
+        """Family of fibres by their isochoric stretch.
+
+        Raises:
+            Untranslatable: They have another exponent than 2.
+        """
         modulus, exponential, power = self._fibre_constants(element, "fiber-exp-pow-uncoupled")
         if power != 2:
             raise Untranslatable(f"fibres with beta = {power:g}, other than 2", element.line)
