@@ -37,7 +37,7 @@ def test_every_package_has_its_place():
 @pytest.mark.parametrize("package", PACKAGES)
 def test_imports_flow_one_way(package):
     allowed = PACKAGES[: PACKAGES.index(package) + 1]
-    for path in (SOURCES / package).glob("*.py"):
+    for path in (SOURCES / package).rglob("*.py"):
         strangers = {name for name in imports(path) if name.split(".")[1] not in allowed}
         assert not strangers, f"{package}.{path.stem} imports {', '.join(sorted(strangers))}"
 
@@ -53,7 +53,8 @@ def test_mpi_is_loaded_first(package):
 
 
 def test_no_module_imports_itself_through_others():
-    graph = {f"cutsim.{path.parent.name}.{path.stem}": imports(path) for path in SOURCES.glob("*/*.py")}
+    modules = {path: ".".join(path.relative_to(SOURCES).with_suffix("").parts) for path in SOURCES.glob("*/**/*.py")}
+    graph = {f"cutsim.{name}": imports(path) for path, name in modules.items()}
     TopologicalSorter(graph).prepare()  # raises CycleError
 
 
