@@ -59,7 +59,7 @@ def parameters(function):
 # a property and its setter, and overloads, have one name
 DEFINITIONS = [
     definition
-    for path in sorted(SOURCES.glob("*/*.py"))
+    for path in sorted(SOURCES.glob("*/**/*.py"))
     for definition in inside(ast.parse(path.read_text()), f"{path.parent.name}.{path.stem}")
 ]
 FUNCTIONS = [(name, node) for name, node in DEFINITIONS if isinstance(node, ast.FunctionDef)]
