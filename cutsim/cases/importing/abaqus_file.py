@@ -134,15 +134,12 @@ def entry(entries: list[str], i: int) -> str:
 
 
 def _located(cards: Iterable[Card]) -> Iterator[Located]:
-    part, step, steps = "", 0, 0
+    part, step = "", 0
     for card in cards:
         if card.keyword == "PART":
             part = card.get("NAME")
         elif card.keyword == "STEP":
-            steps += 1
-            step = steps
+            step += 1
         yield Located(card, part, step)
         if card.keyword == "END PART":
             part = ""
-        elif card.keyword == "END STEP":
-            step = steps
