@@ -248,8 +248,8 @@ def make_result(folder, depth, force, *, until=None, verdict="trusted", unit="mm
     folder.mkdir()
     rows = [f"depth [{unit}],force [N],cuts", *(f"{d},{f},0" for d, f in zip(depth, force, strict=True))]
     (folder / "history.csv").write_text("\n".join(rows) + "\n")
-    reasons = ["interrupted at time 2"] if until else []
-    summary = {"verdict": verdict, "reasons": reasons, "time": depth[-1], "until": until or depth[-1]}
+    kinds = ["interrupted"] if until else []
+    summary = {"verdict": verdict, "kinds": kinds, "time": depth[-1], "until": until or depth[-1]}
     (folder / "summary.json").write_text(json.dumps(summary))
     return str(folder)
 

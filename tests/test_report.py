@@ -82,7 +82,7 @@ def test_page_has_the_numbers_and_needs_nothing_else(tmp_path):
     [
         ({"verdict": "questionable", "reasons": ["a hole"], "until": 1.0}, "questionable", "but one reason speaks"),
         ({"verdict": "questionable", "reasons": ["no step succeeds"]}, "failed", "ended at time 1 of 2 s, 50%"),
-        ({"verdict": "questionable", "reasons": ["interrupted at time 1 of 2"]}, "interrupted", "50%"),
+        ({"verdict": "questionable", "kinds": ["interrupted"]}, "interrupted", "50%"),
         ({}, "unknown", "no verdict"),
     ],
 )

@@ -132,7 +132,7 @@ def test_the_worst_is_kept_and_said_once(caplog):
     for size in (1.0, 3.0, 2.0):
         verdict.doubt("closure", f"{size} missing", size)
     assert verdict.reasons == ("3.0 missing",) and [r.message for r in caplog.records] == ["1.0 missing"]
-    assert verdict.record() == {"verdict": "questionable", "reasons": ["3.0 missing"]}
+    assert verdict.record() == {"verdict": "questionable", "reasons": ["3.0 missing"], "kinds": ["closure"]}
 
 
 def summary(folder):

@@ -20,6 +20,7 @@ from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.base.units import Time
+from cutsim.base.verdict import INTERRUPTED
 from cutsim.fields.state import Pace, State
 from cutsim.solvers.iterations import LINE_SEARCHES, Outcome
 
@@ -32,7 +33,7 @@ _STRAYED = 1e-3
 # corners that differ by less than this fraction of the smallest step are one
 _ROUNDING = 1e-6
 # what the verdict says of a run that has not come to its end, until it goes on
-_ENDS = ("interrupted", "ended")
+_ENDS = (INTERRUPTED, "ended")
 
 
 class Audit(Protocol):
@@ -308,7 +309,7 @@ def run(
             if report.interrupted:
                 words = f"interrupted at time {report.time:.6g} of {until:.6g}"
                 if report.time < until:
-                    state.verdict.suppose("interrupted", words, aloud=True)
+                    state.verdict.suppose(INTERRUPTED, words, aloud=True)
                 if interrupt == "raise":
                     raise Interrupted(words, report)
                 break

@@ -7,6 +7,8 @@ logger = collective_logger(__name__)
 
 #: Allowed gap of an audit of energy or heat, relative to its largest turnover.
 CLOSURE = 0.02
+#: Kind of doubt of a run that was interrupted before its end.
+INTERRUPTED = "interrupted"
 
 
 class Verdict:
@@ -60,9 +62,14 @@ class Verdict:
             self._warned.add(kind)
 
     @property
+    def doubts(self) -> dict[str, str]:
+        """What speaks against the result: kind → reason, in the order in which it was seen."""
+        return {kind: words for kind, (_, words) in self._reasons.committed.items()} | self._pending.committed
+
+    @property
     def reasons(self) -> tuple[str, ...]:
-        """What speaks against the result, in the order in which it was seen."""
-        return (*(words for _, words in self._reasons.committed.values()), *self._pending.committed.values())
+        """What speaks against the result, in words."""
+        return tuple(self.doubts.values())
 
     @property
     def trusted(self) -> bool:
@@ -70,8 +77,9 @@ class Verdict:
         return not self.reasons
 
     def record(self) -> dict[str, str | list[str]]:
-        """The fields "verdict" and "reasons" of a summary."""
-        return {"verdict": "trusted" if self.trusted else "questionable", "reasons": list(self.reasons)}
+        """The fields "verdict", "reasons" and their "kinds" of a summary."""
+        verdict = "trusted" if self.trusted else "questionable"
+        return {"verdict": verdict, "reasons": list(self.reasons), "kinds": list(self.doubts)}
 
     def __str__(self) -> str:
         return "trusted" if self.trusted else "questionable: " + "; ".join(self.reasons)

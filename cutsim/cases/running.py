@@ -35,8 +35,6 @@ logger = logging.getLogger(__name__)
 
 # keys that may be changed before a run is resumed: they say how, how far and for whom it is computed
 _FREE = {"title", "steps", "solver", "output", ("analysis", "until")}
-#: Exit codes of ends before the time.
-NO_EQUILIBRIUM, CANNOT_WRITE, INTERRUPTED = 3, 4, 130
 
 
 @dataclass(frozen=True)
@@ -54,15 +52,6 @@ class RunOutcome:
     verdict: str
     reasons: tuple[str, ...] = ()
     error: BaseException | None = None
-
-    @property
-    def exit_code(self) -> int:
-        """Exit code of a command: 0 trusted, 1 questionable, 3 no equilibrium, 4 cannot write, 130 interrupted."""
-        if self.error is None:
-            return int(self.verdict != "trusted")
-        if isinstance(self.error, Interrupted):
-            return INTERRUPTED
-        return CANNOT_WRITE if isinstance(self.error, OSError) else NO_EQUILIBRIUM
 
 
 def run_case(

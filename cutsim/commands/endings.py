@@ -8,8 +8,12 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:  # its package loads dolfinx
+    from cutsim.cases.running import RunOutcome
 
 logger = logging.getLogger(__name__)
 
@@ -62,14 +66,23 @@ def _words(error: Exception) -> str:
     return str(error)
 
 
-def ending_of(error: Exception) -> Ending:
+def ending_of(error: BaseException) -> Ending:
     """The exit code that an error stands for; what is none of the user's is a fault of the program."""
     kinds = {kind.__name__ for kind in type(error).__mro__}
-    if "StepError" in kinds:  # by name: its module loads dolfinx
+    if "StepError" in kinds:  # by name, as the next: their module loads dolfinx
         return Ending.NO_EQUILIBRIUM
+    if "Interrupted" in kinds:
+        return Ending.INTERRUPTED
     if isinstance(error, OSError):
         return Ending.BAD_INPUT if isinstance(error, _NOT_AS_NAMED) else Ending.CANNOT_WRITE
     return Ending.BAD_INPUT if isinstance(error, ValueError) else Ending.INTERNAL
+
+
+def ending_of_run(outcome: RunOutcome) -> Ending:
+    """The exit code for a run, which may have been ended by an error."""
+    if outcome.error is not None:
+        return ending_of(outcome.error)
+    return Ending.TRUSTED if outcome.verdict == "trusted" else Ending.QUESTIONABLE
 
 
 #: A file that the user has named is not there, or of another kind, or would be lost.

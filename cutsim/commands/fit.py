@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cutsim.commands.case_files import CaseArgument, Changes, Quick, case_path, settings
-from cutsim.commands.endings import Ending, say
+from cutsim.commands.endings import Ending, ending_of_run, say
 from cutsim.commands.options import Ranks, Width, console, on_ranks
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ def command(
         _show(fit, read_source(data, csv_x, csv_y, width), folder)
         for reason in outcome.reasons:
             say(f"against the fitted run: {reason}")
-    raise typer.Exit(outcome.exit_code or (Ending.QUESTIONABLE if fit.systematic else Ending.TRUSTED))
+    raise typer.Exit(ending_of_run(outcome) or (Ending.QUESTIONABLE if fit.systematic else Ending.TRUSTED))
 
 
 @dataclass(frozen=True)

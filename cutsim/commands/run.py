@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from cutsim.commands.case_files import CaseArgument, Changes, Quick, case_path, settings
-from cutsim.commands.endings import Ending, first_rank, say
+from cutsim.commands.endings import Ending, ending_of_run, first_rank, say
 from cutsim.commands.options import Overwrite, Ranks, console, on_ranks, quiet
 
 if TYPE_CHECKING:
@@ -56,11 +56,12 @@ def end(outcome: RunOutcome) -> NoReturn:
     Raises:
         typer.Exit: With the exit code of the run.
     """
-    if outcome.error is not None and outcome.exit_code != Ending.INTERRUPTED:  # which the run itself says
+    ending = ending_of_run(outcome)
+    if outcome.error is not None and ending is not Ending.INTERRUPTED:  # which the run itself says
         say(str(outcome.error))
-    if outcome.exit_code == Ending.NO_EQUILIBRIUM:
+    if ending is Ending.NO_EQUILIBRIUM:
         say(_ADVICE)
     if not quiet() and first_rank():
-        hint = f"; cutsim resume {outcome.folder} goes on" if outcome.exit_code == Ending.INTERRUPTED else ""
+        hint = f"; cutsim resume {outcome.folder} goes on" if ending is Ending.INTERRUPTED else ""
         console().print(f"results: {outcome.folder}{hint}", markup=False)
-    raise typer.Exit(outcome.exit_code)
+    raise typer.Exit(ending)

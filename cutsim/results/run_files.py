@@ -12,6 +12,7 @@ import numpy as np
 
 from cutsim.base.arrays import Array
 from cutsim.base.terms import ENTRIES
+from cutsim.base.verdict import INTERRUPTED
 from cutsim.results.folder import CASE, HISTORY, SUMMARY
 from cutsim.results.output import labelled_columns
 
@@ -22,11 +23,10 @@ _ORDINATES = ("force", "load")
 _AUDIT = tuple(f"energy_{entry}" for entry in ENTRIES)
 # types of the entries of a summary that are looked at
 _TYPES: Mapping[str, Any] = {
-    "verdict": str, "reasons": list, "time": int | float, "until": int | float, "wall_time": int | float, "ranks": int,
+    "verdict": str, "reasons": list, "kinds": list, "time": int | float, "until": int | float,
+    "wall_time": int | float, "ranks": int,
     "curve": list, "mesh": dict, "versions": dict,
 }  # fmt: skip
-# how a reason against a run begins that has not come to its end
-_INTERRUPTED = "interrupted at time"
 # part of the time of a run by which it may miss its end
 _ROUNDING = 1e-9
 
@@ -139,7 +139,7 @@ class RunFiles:
             return Judgement("unknown", "There is no verdict: the run has not ended, or was ended from outside.")
         reasons = tuple(map(str, self.summary.get("reasons", ())))
         if not self.complete:
-            interrupted = any(reason.startswith(_INTERRUPTED) for reason in reasons)
+            interrupted = INTERRUPTED in self.summary.get("kinds", ())
             return Judgement("interrupted" if interrupted else "failed", f"{self._end}.", reasons)
         if self.summary["verdict"] == "trusted":
             return Judgement("trusted", "The run is complete, and nothing speaks against its result.")
