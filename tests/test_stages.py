@@ -6,6 +6,7 @@ from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, StepError, run
+from cutsim.base.rotations import rotation_matrix
 from cutsim.fields.points import Surface
 from cutsim.interface.contact import PenaltyContact
 from cutsim.results.animation import animate, draw_stages
@@ -13,7 +14,7 @@ from cutsim.results.pictures import polydata
 from cutsim.results.scene import sharp_edges
 from cutsim.results.stage_recorder import Stages
 from cutsim.results.stages import Skin, Stage, read_stages, spread
-from cutsim.results.tool_surfaces import ToolSurfaces, _pointed
+from cutsim.results.tool_surfaces import Pose, ToolSurfaces, _pointed
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, ToolPath
 from cutsim.tools.tool_contact import ToolContact
@@ -112,12 +113,16 @@ def test_halves_of_a_blade_are_one_where_they_are_together():
 @pytest.mark.parametrize("side", [-1, 0, 1])
 def test_tools_in_space_reach_beyond_the_body(side):
     options = {"push": (0.0, 0.0, -1.0), "lateral": (1.0, 0.0, 0.0), "side": side}
-    box, tip = np.array([(0.0, 0.0, 0.0), (1.0, 1.0, 1.0)]), np.array([0.5, 0.5, 0.8])
+    box, tip = np.array([(0.0, 0.0, 0.0), (1.0, 1.0, 1.0)]), Pose(np.array([0.5, 0.5, 0.8]), np.eye(3))
     ends = 0.5 + 0.15 * np.array([min(side, 0) - (not side), max(side, 0) + (not side)])
     blade = _pointed(Blade(0.3, 0.05, half_thickness=0.15, **options), tip, box)
     assert blade.bounds == pytest.approx((*ends, -0.05, 1.05, 0.8, 1.3)) and blade.n_open_edges == 0
     needle = _pointed(Needle(0.3, 0.05, radius=0.15, **options), tip, box)
     assert needle.bounds == pytest.approx((*ends, 0.35, 0.65, 0.8, 1.3), abs=1e-3)
+    lying = Pose(tip.position, rotation_matrix((0.0, np.pi / 2, 0.0)))  # the tip points to −x
+    blade = _pointed(Blade(0.3, 0.05, half_thickness=0.15, **options), lying, box)
+    ends = 0.8 + 0.15 * np.array([min(-side, 0) - (not side), max(-side, 0) + (not side)])
+    assert blade.bounds == pytest.approx((0.5, 1.3, -0.05, 1.05, *ends))
 
 
 def test_image_of_a_part_has_no_seam():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from cutsim.base.arrays import Array
 from cutsim.base.compat import nodal_expression
 from cutsim.results.grids import library
 from cutsim.tools.pointed import Pointed
+from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.tool_contact import ToolContact
 from cutsim.tools.triangulated_tool import TriangulatedTool
 
@@ -86,6 +87,36 @@ def revolved(
     return pyvista.StructuredGrid(*np.moveaxis(x, -1, 0)[..., None]).extract_surface(algorithm="dataset_surface")
 
 
+@dataclass(frozen=True)
+class Pose:
+    """Where a tool is, in three dimensions.
+
+    Attributes:
+        position: Position of its reference point [length].
+        rotation: Rotation from its frame, a matrix.
+    """
+
+    position: Array
+    rotation: Array
+
+    @classmethod
+    def of(cls, tool: RigidTool) -> Pose:
+        """Present pose of a tool."""
+        rotation, gdim = np.eye(3), len(tool.position.value)
+        rotation[:gdim, :gdim] = tool.rotation.value
+        return cls(_padded(tool.position.value), rotation)
+
+    def within(self, points: Array) -> Array:
+        """Points in the frame of the tool."""
+        return np.asarray((points - self.position) @ self.rotation)
+
+    def placed(self, surface: pyvista.PolyData) -> pyvista.PolyData:
+        """A surface that is given in the frame of the tool."""
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = self.rotation, self.position
+        return surface.transform(matrix, inplace=False)
+
+
 class ToolSurfaces:
     """Surfaces of the rigid tools of a problem where they are at the time, as far as they are near the body.
 
@@ -97,13 +128,13 @@ class ToolSurfaces:
     """
 
     def __init__(self, terms: Iterable[Any]) -> None:
-        self._pointed: list[tuple[Pointed, fem.Constant]] = []
+        self._pointed: list[tuple[Pointed, RigidTool]] = []
         self._others: list[Callable[[Array], Any]] = []
         for tool in terms:
             if isinstance(tool, TriangulatedTool):
                 self._others.append(_Triangulated(tool))
             elif isinstance(tool, ToolContact) and isinstance(tool.shape, Pointed):
-                self._pointed.append((tool.shape, tool.position))
+                self._pointed.append((tool.shape, tool))
             elif isinstance(tool, ToolContact):
                 self._others.append(_Level(tool))
 
@@ -114,49 +145,49 @@ class ToolSurfaces:
             bounds: Box around the deformed body, (xmin, xmax, ymin, ymax, zmin, zmax) [length].
         """
         box = np.reshape(bounds, (3, 2)).T
-        parts = [_pointed(shape, _padded(tip), box) for tip, shape in self._together().items()]
+        parts = [_pointed(shape, pose, box) for shape, pose in self._together()]
         parts += [surface(box) for surface in self._others]
         parts = [part.triangulate() for part in parts if part.n_cells]
         return parts[0].append_polydata(*parts[1:]) if parts else None
 
-    def _together(self) -> dict[tuple[float, ...], Pointed]:
-        """Blades and needles by their place; what meets several parts of a crack is one, and so are two halves."""
-        found: dict[tuple[float, ...], Pointed] = {}
-        for shape, position in self._pointed:
-            tip = tuple(float(x) for x in position.value)
-            other = found.setdefault(tip, shape)
+    def _together(self) -> Iterable[tuple[Pointed, Pose]]:
+        """Blades and needles by their pose; what meets several parts of a crack is one, and so are two halves."""
+        found: dict[bytes, tuple[Pointed, Pose]] = {}
+        for shape, tool in self._pointed:
+            pose = Pose.of(tool)
+            place = pose.position.tobytes() + pose.rotation.tobytes()
+            other, _ = found.setdefault(place, (shape, pose))
             if other.side != shape.side:
-                found[tip] = replace(shape, side=0)  # type: ignore[type-var]
-        return found
+                found[place] = replace(shape, side=0), pose  # type: ignore[type-var]
+        return found.values()
 
 
-def _pointed(shape: Pointed, tip: Array, box: Array) -> Any:
+def _pointed(shape: Pointed, pose: Pose, box: Array) -> Any:
     """A blade or needle, or half of it, from its tip to above the lowest and highest corner of a box."""
     push, flat = _padded(shape.push), len(shape.push) == 2
     across = np.eye(3)[2 if flat else int(np.abs(push).argmin())]
     lateral = np.cross(across, push) if shape.lateral is None else _padded(shape.lateral)
     lateral = lateral / np.linalg.norm(lateral)
     edge = np.cross(push, lateral)
-    arms = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - tip
+    arms = pose.within(np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3))
     (foot, top), (low, high) = ((np.min(arms @ e), np.max(arms @ e)) for e in (-push, edge))
     outline = shape.outline(max(top + _ABOVE * (top - foot), shape.tip_radius))
     if shape.round and not flat:
         turn = (-np.pi / 2, np.pi / 2) if shape.side else (0.0, 2 * np.pi)
-        return revolved(outline, tip, ((shape.side or 1) * lateral, -push), turn=turn)
+        return pose.placed(revolved(outline, np.zeros(3), ((shape.side or 1) * lateral, -push), turn=turn))
     if shape.side:
         outline = outline[shape.side * outline[:, 0] >= 0]
-    beside = _BESIDE * (high - low)
-    start = tip + (low - beside) * edge
-    if flat:
-        return prism(outline, tip, (lateral, -push))
-    return prism(outline, start, (lateral, -push), (high - low + 2 * beside) * edge)
+    beside = 0.0 if flat else _BESIDE * (high - low)
+    length = None if flat else (high - low + 2 * beside) * edge
+    start = np.zeros(3) if flat else (low - beside) * edge
+    return pose.placed(prism(outline, start, (lateral, -push), length))
 
 
 class _Level:
     """A tool of any shape within a box, from the signed distance at the nodes of a regular grid."""
 
     def __init__(self, tool: ToolContact) -> None:
-        self._position, gdim = tool.position, len(tool.position.value)
+        self._tool, gdim = tool, len(tool.position.value)
         n, comm = _SAMPLES[gdim], MPI.COMM_SELF
         domain = (
             create_unit_square(comm, n, n, CellType.quadrilateral)
@@ -164,16 +195,21 @@ class _Level:
             else create_unit_cube(comm, n, n, n, CellType.hexahedron)
         )
         self._corner, self._size = (fem.Constant(domain, np.zeros(gdim, default_scalar_type)) for _ in range(2))
+        self._rotation = fem.Constant(domain, np.eye(gdim, dtype=default_scalar_type))
         x = ufl.SpatialCoordinate(domain)
-        place = ufl.as_vector([self._corner[i] + self._size[i] * x[i] for i in range(gdim)])
+        place = ufl.transpose(self._rotation) * ufl.as_vector(
+            [self._corner[i] + self._size[i] * x[i] for i in range(gdim)]
+        )
         self._distance = fem.Function(fem.functionspace(domain, ("Lagrange", 1)))
         self._expression = nodal_expression(tool.shape.distance(place), self._distance.function_space)
 
     def __call__(self, box: Array) -> Any:
-        pyvista, gdim = library("no tool is drawn"), len(self._position.value)
+        pyvista, position = library("no tool is drawn"), self._tool.position.value
+        gdim = len(position)
         box = box + _BEYOND * np.ptp(box, axis=0).max() * np.array([[-1.0], [1.0]])
         size = np.ptp(box, axis=0)
-        self._corner.value[:], self._size.value[:] = box[0, :gdim] - self._position.value, size[:gdim]
+        self._corner.value[:], self._size.value[:] = box[0, :gdim] - position, size[:gdim]
+        self._rotation.value[:] = self._tool.rotation.value
         self._distance.interpolate(self._expression)
         cells, kinds, points = plot.vtk_mesh(self._distance.function_space)
         flat = np.arange(3) >= gdim
@@ -186,7 +222,7 @@ class _Triangulated:
     """A tool of triangles, or in the plane of segments, which are filled."""
 
     def __init__(self, tool: TriangulatedTool) -> None:
-        self._position, surface = tool.position, tool.surface
+        self._tool, surface = tool, tool.surface
         pyvista = library("no tool is drawn")
         facets = np.insert(surface.facets, 0, surface.facets.shape[1], axis=1).ravel()
         points = np.pad(surface.points, ((0, 0), (0, 3 - surface.points.shape[1])))
@@ -197,7 +233,7 @@ class _Triangulated:
             self._mesh = pyvista.PolyData(loops.points, faces=_closed(loops.lines))
 
     def __call__(self, box: Array) -> Any:
-        return self._mesh.translate(_padded(self._position.value))
+        return Pose.of(self._tool).placed(self._mesh)
 
 
 def front(terms: Iterable[Any]) -> dict[str, tuple[float, ...]]:
@@ -215,6 +251,7 @@ def front(terms: Iterable[Any]) -> dict[str, tuple[float, ...]]:
         push = getattr(tool.shape, "push", None) if isinstance(tool, ToolContact) else None
         if push is not None:
             right = getattr(tool.shape, "lateral", None) or np.cross(push, np.eye(3)[int(np.abs(push).argmin())])
+            right, push = (tool.rotation.value @ np.asarray(v) for v in (right, push))
             return {"right": tuple(map(float, right)), "up": tuple(-float(p) for p in push)}
     return {}
 

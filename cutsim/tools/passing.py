@@ -95,7 +95,7 @@ class Passing:
         end, met = state.u.x.array.copy(), [np.zeros_like(points) for points in some]
         for s in np.linspace(0.0, 1.0, _SAMPLES + 1)[1:]:
             state.u.x.array[:] = state.u_old.x.array + s * (end - state.u_old.x.array)
-            tool.position.value[:] = tool.path.position(state.time_old + s * (state.time - state.time_old))
+            tool.move(s)
             inside = [patch.contact()["depth"] > 0 for patch in self._patches]
             met = [before | (points & now) for before, points, now in zip(met, some, inside, strict=True)]
         state.u.x.array[:] = end

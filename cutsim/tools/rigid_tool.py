@@ -8,6 +8,7 @@ from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
 from cutsim.base.checks import as_array, require
+from cutsim.base.rotations import rotation_matrix, rotation_vector
 from cutsim.base.terms import Term
 from cutsim.fields.state import State
 from cutsim.interface.doubts import doubt_penetration
@@ -19,26 +20,30 @@ _Action = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class RigidTool(Term, ABC):
-    """Rigid tool whose reference point follows a path without rotation.
+    """Rigid tool that moves and turns along a path.
 
     Args:
         state: Displacement and time.
-        path: Motion of the reference point.
+        path: Motion of the reference point, and rotation about it.
         name: Name in messages and output.
 
     Attributes:
-        position: Present position of the reference point.
+        position: Present position of the reference point [length].
+        rotation: Present rotation R, a matrix: a point x of the body lies at Rᵀ(x − position) in the tool's frame.
 
     Raises:
-        ValueError: The path has another dimension than the mesh.
+        ValueError: The path has another dimension than the mesh, or turns the tool of a body of revolution.
     """
 
     def __init__(self, state: State, path: ToolPath, name: str) -> None:
         gdim = state.mesh.geometry.dim
-        start = _position(path, 0.0, gdim)
+        turns = path.rotation is not None
+        require("path.rotation", path.rotation, not (turns and state.axisymmetric), "None for a body of revolution")
         self.name, self.state, self.path = name, state, path
-        self.position = fem.Constant(state.mesh, start.astype(default_scalar_type))
+        position, rotation = (np.array(p, dtype=default_scalar_type) for p in _pose(path, 0.0, gdim))
+        self.position, self.rotation = fem.Constant(state.mesh, position), fem.Constant(state.mesh, rotation)
         self._position = state.memory.array(f"{name}: position", self.position)
+        self._rotation = state.memory.array(f"{name}: rotation", self.rotation)
         none: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
         self._action = state.memory.value(f"{name}: force and moment", none)
         state.verdict.suppose(self._untouched, f"{name} has never touched the body")
@@ -58,17 +63,28 @@ class RigidTool(Term, ABC):
         """Increment of the tool's position in the step [length]."""
         return np.asarray(self._position.trial - self._position.committed)
 
+    @property
+    def turn(self) -> NDArray[np.float64]:
+        """Increment of the tool's rotation in the step, an angle or a rotation vector in space [rad]."""
+        return rotation_vector(self._rotation.trial @ self._rotation.committed.T)
+
     def act(self, force: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
         """Note force and moment on the tool in the trial state, for `evaluate`."""
         self._action.trial = force, moment
 
     def begin(self) -> None:
-        """Move the tool to its position at the end of the step."""
-        self.position.value[:] = _position(self.path, self.state.time, len(self.position.value))
+        """Move the tool to where it is at the end of the step."""
+        self.move(1.0)
+
+    def move(self, fraction: float) -> None:
+        """Move the tool to where it is after a fraction of the step."""
+        time = self.state.time_old + fraction * (self.state.time - self.state.time_old)
+        self.position.value[:], self.rotation.value[:] = _pose(self.path, time, len(self.position.value))
 
     def external_work(self) -> float:
-        """Work of the tool on the body in the step: mean force times increment. Collective."""
-        return float(-0.5 * (self._action.trial[0] + self._action.committed[0]) @ self.displacement)
+        """Work of the tool on the body in the step: mean force and moment times their increments. Collective."""
+        force, moment = (0.5 * (now + old) for now, old in zip(self._action.trial, self._action.committed, strict=True))
+        return float(-force @ self.displacement - moment @ self.turn)
 
     def force(self) -> NDArray[np.float64]:
         """Force on the tool in the trial state, from the virtual work of a rigid translation [force]."""
@@ -79,12 +95,15 @@ class RigidTool(Term, ABC):
         return self._action.trial[1]
 
     def record(self) -> dict[str, tuple[float, str]]:
-        """Position, force and moment of the tool, areas that stick and slip. Collective."""
+        """Position, rotation, force and moment of the tool, areas that stick and slip. Collective."""
         force, couple = self.force(), self.moment()
         gdim = len(force)
         columns = {f"{self.name}_{_AXES[i]}": (float(self.position.value[i]), "length") for i in range(gdim)}
-        columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
         axes = _AXES if gdim == 3 else "z"
+        if self.path.rotation is not None:
+            angles = zip(axes, rotation_vector(self.rotation.value), strict=True)
+            columns |= {f"{self.name}_rotation_{a}": (float(angle), "angle") for a, angle in angles}
+        columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
         if not self.state.axisymmetric:  # moments of a ring balance each other
             columns |= {f"{self.name}_moment_{a}": (float(m), "moment") for a, m in zip(axes, couple, strict=True)}
         if self.slips:
@@ -118,8 +137,14 @@ class RigidTool(Term, ABC):
         return f"{self.name}: untouched"
 
 
-def _position(path: ToolPath, time: float, gdim: int) -> NDArray[np.float64]:
-    """Where a path is, if that is a place of the mesh's dimension."""
+def _pose(path: ToolPath, time: float, gdim: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position and rotation matrix of a path, if they are those of the mesh's dimension."""
     position = as_array(f"path({time:.6g})", path.position(time))
     require(f"path({time:.6g})", position, position.shape == (gdim,), f"a position of {gdim} components")
-    return position
+    if path.rotation is None:
+        return position, np.eye(gdim)
+    name = f"path.rotation({time:.6g})"
+    turn = np.atleast_1d(as_array(name, path.rotation(time)))
+    words = "a rotation vector of 3 components" if gdim == 3 else "an angle"
+    require(name, turn, turn.shape == (3 if gdim == 3 else 1,), words)
+    return position, rotation_matrix(turn)

@@ -200,15 +200,19 @@ class Plane:
 @checked
 @dataclass(frozen=True)
 class ToolPath:
-    """Prescribed motion of a tool's reference point.
+    """Prescribed motion of a tool: the position of its reference point, and the rotation about it.
 
     Args:
         position: Position at a time, array of the geometric dimension [length].
-        corners: Times at which the velocity jumps; the stepping meets them exactly.
+        corners: Times at which a velocity jumps; the stepping meets them exactly.
+        rotation: Rotation at a time from the frame in which the tool's shape is given: an angle in the plane,
+            counterclockwise; a rotation vector in space, the axis times the angle [rad]. None for a tool that never
+            turns.
     """
 
     position: Callable[[float], NDArray[np.float64]]
     corners: tuple[float, ...] = field(default=())
+    rotation: Callable[[float], float | NDArray[np.float64]] | None = None
 
     def __post_init__(self) -> None:
         require_numbers("corners", self.corners, least=0)

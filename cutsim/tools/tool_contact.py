@@ -34,15 +34,15 @@ class Patch:
         name: Name of the tool.
         surface: The surface.
         shape: Signed distance of the tool.
-        position: Its present position.
+        pose: Its present position and rotation.
         contact: Contact law.
         friction: Friction law with a tangential penalty, or None.
         temperature: Temperature of the body, for friction laws that depend on it.
 
     Attributes:
         surface: The surface.
-        place: Position of its points relative to the tool [length].
-        thrust: Traction of the contact pressure on the tool, −p ∇d [stress].
+        place: Position of its points in the frame of the tool [length].
+        thrust: Traction of the contact pressure on the tool in that frame, −p ∇d [stress].
         normal_size: Mean size of the cells normal to the surface [length].
         slip: Memory of friction, None without friction.
     """
@@ -53,13 +53,15 @@ class Patch:
         name: str,
         surface: Surface,
         shape: Shape,
-        position: fem.Constant,
+        pose: tuple[fem.Constant, fem.Constant],
         contact: PenaltyContact,
         friction: FrictionLaw | None,
         temperature: Temperature | None,
     ) -> None:
         self.surface = surface
-        self.place = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
+        position, self._rotation = pose
+        moved = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
+        self.place = ufl.transpose(self._rotation) * moved
         x, shape = ufl.variable(self.place), with_constant_directions(state.mesh, shape)
         normal = ufl.diff(shape.distance(x), x)
         self._contact = with_constants(state.mesh, contact)
@@ -67,11 +69,11 @@ class Patch:
         self.normal_size = surface.points.mean(normal_size(state.mesh, surface.points.facets))
         self._pressure = self._contact.pressure(self._penetration)
         self.thrust = -self._pressure * normal
-        self._facing = ufl.dot(surface.restrict(_outward(state)), normal)
+        self._facing = ufl.dot(surface.restrict(_outward(state)), self._rotation * normal)
         self.slip: SlipHistory | None = None
         if friction is not None:
             rubbing = Rubbing(
-                surface.restrict(state.u) - position,
+                self.place,  # it changes by the slip relative to the tool, which moves and turns
                 self._pressure,
                 self._penetration,
                 project=lambda slip: tangential(slip, normal),
@@ -82,7 +84,7 @@ class Patch:
     def virtual_work(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ (t − p ∇d)·v: pressure and friction as they act on the tool."""
         traction = self.thrust if self.slip is None else self.thrust + self.slip.traction
-        return ufl.dot(traction, self.surface.restrict(v)) * self.surface.measure
+        return ufl.dot(self._rotation * traction, self.surface.restrict(v)) * self.surface.measure
 
     def energy(self) -> ufl.Form:
         """Energy of the contact penalty."""
@@ -133,7 +135,7 @@ class ToolContact(RigidTool):
     Args:
         state: Displacement and time.
         shape: Signed distance of the tool.
-        path: Motion of its reference point.
+        path: Motion of its reference point, and rotation about it.
         surfaces: Surfaces the tool can touch; each side of a crack by itself.
         contact: Contact law; the pressure acts per reference area.
         friction: Friction law against the slip relative to the tool, or the coefficient of Coulomb's, None for none;
@@ -169,7 +171,8 @@ class ToolContact(RigidTool):
         self.shape, self.contact, self.friction = shape, contact, friction
         law = completed(friction, contact.stiffness) if friction else None
         self.symmetric = law is None
-        self.patches = tuple(Patch(state, name, s, shape, self.position, contact, law, temperature) for s in surfaces)
+        pose = self.position, self.rotation
+        self.patches = tuple(Patch(state, name, s, shape, pose, contact, law, temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
         self._passing = Passing(self, self.patches)

@@ -59,7 +59,7 @@ class ToolParts:
         return {}
 
     def force(self, part: str) -> float:
-        """Force on a part against the direction of push, pressure and friction, in the trial state [force]."""
+        """Force on a part against the push, which turns with the tool, in the trial state; with friction [force]."""
         return self._known.trial["force", part]
 
     def friction(self, part: str) -> float:

@@ -35,20 +35,24 @@ class RigidSurface:
 
     Args:
         triangulation: The surface, relative to the reference point.
-        position: Position of the reference point; it is read whenever the surface is asked for.
+        pose: Position of the reference point and rotation about it; they are read whenever the surface is asked for.
     """
 
-    def __init__(self, triangulation: Triangulation, position: RememberedArray) -> None:
+    def __init__(self, triangulation: Triangulation, pose: tuple[RememberedArray, RememberedArray]) -> None:
         kind = {2: basix.CellType.interval, 3: basix.CellType.triangle}[triangulation.points.shape[1]]
         self.shape = FacetShape(basix.create_element(basix.ElementFamily.P, kind, 1))
-        self._corners, self._position = triangulation.corners, position
+        self._corners, (self._position, self._rotation) = triangulation.corners, pose
         self.sides: Array = np.ones(len(self._corners))
-        self.reference: Array = self._corners + position.committed
+        self.reference: Array = self._placed(start=True)
         self.global_nodes: Indices = np.full(triangulation.facets.shape, -1)
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, at the start or the end of the step, whatever the displacement."""
-        return self._corners + (self._position.committed if start else self._position.trial)
+        return self._placed(start=start)
+
+    def _placed(self, *, start: bool) -> Array:
+        position, rotation = (p.committed if start else p.trial for p in (self._position, self._rotation))
+        return np.asarray(self._corners @ rotation.T + position)
 
     def gather(self, values: Array) -> Array:
         """Zero: the surface has no unknowns."""
@@ -84,7 +88,7 @@ class TriangulatedTool(RigidTool):
         state: Displacement, of degree 1 or 2, and time.
         facets: Local exterior facets that the tool can touch, ghosts included.
         surface: Surface of the tool relative to its reference point, the same on all ranks.
-        path: Motion of the reference point.
+        path: Motion of the reference point, and rotation about it.
         contact: Contact law; the pressure acts per reference area.
         friction: Friction law, or the coefficient of Coulomb's, None for none; without a tangential penalty of its own
             it takes that of the contact law.
@@ -118,7 +122,7 @@ class TriangulatedTool(RigidTool):
         require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
         points = slave_points(state, facets, state.measures.exterior(facets))
         size = points.mean(facet_size(state.mesh, points.facets))
-        master = RigidSurface(surface, self._position)
+        master = RigidSurface(surface, (self._position, self._rotation))
         self.contact, self.surface = contact, surface
         self._normal_size = points.mean(normal_size(state.mesh, points.facets))
         slave = SlaveSurface(state.V, points)
