@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
+from cutsim.fields.faces import Face, rows
 
 
 class _Revolved(ufl.Measure):
@@ -86,6 +87,22 @@ class Measures:
         require(name, found, found > 0, "at least one exterior facet")
         self._check_area(np.asarray(facets, dtype=np.int32))
         return self._add("ds", np.asarray(pairs))
+
+    def face(self, face: Face, name: str = "facets") -> ufl.Measure:
+        """Measure over facets as parts of the boundary of their cells, also within the mesh. Collective.
+
+        Args:
+            face: The facets; those of ghost cells are left out.
+            name: Name of the parameter as the user wrote it.
+
+        Raises:
+            ValueError: There is none on any rank, or some have no area because they are on the axis of rotation.
+        """
+        pairs = rows([face], self.mesh.topology.index_map(self._tdim).size_local)
+        found = self.mesh.comm.allreduce(len(pairs))
+        require(name, found, found > 0, "at least one facet")
+        self._check_area(face.facets)
+        return self._add("ds", pairs)
 
     def interior(self, entities: NDArray[np.int32]) -> ufl.Measure:
         """Measure over interior facets given as rows (cell⁺, local facet⁺, cell⁻, local facet⁻)."""

@@ -26,7 +26,6 @@ class HeatPass:
     Args:
         temperature: The temperature.
         contact: The pass of the mechanical pair.
-        master: Local facets of its master surface, ghosts included.
         law: Law of exchange, '+' being the slave.
         name: Name in messages.
 
@@ -39,17 +38,16 @@ class HeatPass:
         self,
         temperature: Temperature,
         contact: SurfacePass,
-        master: NDArray[np.int32],
         law: ContactHeat,
         name: str,
     ) -> None:
         self.contact, self._temperature, self._fraction = contact, temperature, law.fracture_fraction
         points, kinematics = contact.points, contact.kinematics
-        self._slave = OuterSurface(temperature.space, kinematics.slave.facets)
-        self._master = SharedSurface(OuterSurface(temperature.space, master))
+        self._slave = OuterSurface(temperature.space, kinematics.slave.face)
+        self._master = SharedSurface(OuterSurface(temperature.space, kinematics.master.face))
         places = basix.make_quadrature(self._slave.shape.element.cell_type, points.degree)[0]
-        self._own_values = np.tile(self._slave.shape.values(places)[0], (len(self._slave.facets), 1))
-        self._facets: Indices = np.repeat(np.arange(len(self._slave.facets)), len(places))
+        self._own_values = np.tile(self._slave.shape.values(places)[0], (len(self._slave.owned), 1))
+        self._facets: Indices = np.repeat(np.arange(len(self._slave.owned)), len(places))
         self._pair()
         self._faces = points.function(2)
         self._feel()

@@ -42,9 +42,12 @@ class PairHeat(ExchangeTerm):
         require("pair", pair.name, pair.state is temperature.state, "a pair made with the state of the temperature")
         self.pair, self.law = pair, law
         swapped = replace(law, gamma_plus=law.gamma_minus, gamma_minus=law.gamma_plus)
+        if pair.folding:
+            same = law.gamma_plus == law.gamma_minus
+            require("law", law, same, "the same on both sides of a surface that meets itself")
         self.passes = tuple(
-            HeatPass(temperature, contact, master, side, self.name)
-            for contact, master, side in zip(pair.passes, pair.facets[::-1], (law, swapped), strict=False)
+            HeatPass(temperature, contact, law if sign > 0 else swapped, self.name)
+            for contact, sign in zip(pair.passes, pair.signs, strict=True)
         )
 
     def residual(self, w: Expr) -> ufl.Form:
@@ -73,5 +76,6 @@ class PairHeat(ExchangeTerm):
 
     def flow(self, side: str) -> float:
         """Heat flow out of a surface, side "plus" (slave) or "minus" (master) [power]. Collective."""
-        sides = (side, {"plus": "minus", "minus": "plus"}[side])
-        return sum(p.exchange.flow(s) for p, s in zip(self.passes, sides, strict=False))
+        other = {"plus": "minus", "minus": "plus"}[side]
+        signs = self.pair.signs
+        return sum(p.exchange.flow(side if s > 0 else other) for p, s in zip(self.passes, signs, strict=True))

@@ -19,6 +19,7 @@ from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.crack_checks import check_cracked
+from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints, Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.space import crack_measure_entities
@@ -53,6 +54,9 @@ class Crack(Term):
             other options `CrackFriction` is a term of its own, beside a crack without this.
         allowed_penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
         normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
+        closing: Whether closed faces press on each other where they met in the reference configuration. Faces that
+            slide by more than a facet need False, and a `SurfacePair` of the two `face`s beside the crack, which then
+            carries pressure and friction.
 
     Attributes:
         young: Young's modulus of the softer neighbour [stress].
@@ -83,10 +87,13 @@ class Crack(Term):
         friction: FrictionLaw | float | None = None,
         allowed_penetration: float | None = None,
         normal: Literal["current", "reference"] = "current",
+        closing: bool = True,
     ) -> None:
         require_number("young", young, positive)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
         check_friction("friction", friction)
+        for parameter, value in {"friction": friction, "allowed_penetration": allowed_penetration}.items():
+            require(parameter, value, closing or not value, "None with closing=False: a pair of the faces takes it")
         self.name, self.state, self.law, self.young = name, state, law, young
         self._allowed_penetration = allowed_penetration
         self.entities = crack_measure_entities(state.mesh, facets, plus)
@@ -101,7 +108,13 @@ class Crack(Term):
         self.history = InterfaceHistory(state.memory, name, self.points, law)
         augmented = allowed_penetration is not None
         self.faces = CrackFaces(
-            state, self.points, self.history, law, self.contact, current=normal == "current", augmented=augmented
+            state,
+            self.points,
+            self.history,
+            law,
+            self.contact if closing else None,
+            current=normal == "current",
+            augmented=augmented,
         )
         self.friction = CrackFriction(self, friction) if friction else None
 
@@ -145,6 +158,10 @@ class Crack(Term):
     def surface(self, side: Literal["+", "-"]) -> Surface:
         """One face of the crack, for tool contact."""
         return Surface(self.points, side)
+
+    def face(self, side: Literal["+", "-"]) -> Face:
+        """One face of the crack, for a pair of surfaces. Collective."""
+        return Face.of_rows(self.state.mesh, self.entities, side)
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ T·(v⁻ − v⁺) dΓ₀ of cohesive traction and contact pressure."""

@@ -43,7 +43,7 @@ class CrackFaces:
         points: Integration points of the crack.
         history: What they remember.
         law: Cohesive law, None for a crack that is already broken.
-        contact: Contact law of the closed crack.
+        contact: Contact law of the closed crack, None if its faces do not press on each other.
         current: Whether the normal is that of the current mid-surface; else it is that of the reference configuration.
         augmented: Whether a multiplier makes up for penetration.
     """
@@ -54,7 +54,7 @@ class CrackFaces:
         points: FacetPoints,
         history: InterfaceHistory,
         law: CohesiveLaw | None,
-        contact: PenaltyContact,
+        contact: PenaltyContact | None,
         *,
         current: bool,
         augmented: bool,
@@ -62,7 +62,7 @@ class CrackFaces:
         self._state, self._points, self._history = state, points, history
         self._current, self._augmented = current, augmented
         self._law = None if law is None else with_constants(state.mesh, law)
-        self._contact = with_constants(state.mesh, contact)
+        self._contact = None if contact is None else with_constants(state.mesh, contact)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
         self._values = points.evaluator(self._columns())
 

@@ -41,7 +41,7 @@ class InterfaceResponse:
 
 def respond(
     law: CohesiveLaw | None,
-    contact: PenaltyContact,
+    contact: PenaltyContact | None,
     gap: Expr,
     slide: Expr,
     memory: Expr,
@@ -52,7 +52,7 @@ def respond(
 
     Args:
         law: Cohesive law, None for a broken interface.
-        contact: Contact law.
+        contact: Contact law, None for faces that pass through each other.
         gap: Opening δ_n, negative for penetration [length].
         slide: Tangential part δ_t of the jump, a vector of any components [length].
         memory: Smallest secant stiffnesses before this step, a vector [stress/length].
@@ -60,8 +60,8 @@ def respond(
         fade: Factor of the pressure in [0, 1].
     """
     opening = ufl.conditional(ufl.ge(gap, 0), gap, 0.0)
-    depth = multiplier / contact.stiffness - gap
-    pressure = fade * contact.pressure(depth)
+    depth = -gap if contact is None else multiplier / contact.stiffness - gap
+    pressure = ufl.as_ufl(0.0) if contact is None else fade * contact.pressure(depth)
     if law is None:
         none, whole = ufl.as_ufl(0.0), ufl.as_ufl(1.0)
         return InterfaceResponse(

@@ -1,50 +1,46 @@
-"""Facets on the outer boundary and their nodes, distributed or gathered on every rank."""
+"""Facets on the boundary of a body, outer or at a cut, and their nodes, distributed or gathered on every rank."""
 
 from typing import Protocol
 
 import basix
 import numpy as np
 from dolfinx import fem
-from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints
-from cutsim.fields.sizes import incidence
 from cutsim.pairs.overlap import inside_body
 from cutsim.pairs.pairing import Array, FacetShape, Indices
 
 
 class OuterSurface:
-    """Facets of the outer boundary and the nodes of the displacement on them.
+    """Facets of the boundary, outer or at a cut, and the nodes of the displacement on them.
 
     Args:
-        V: Space of a scalar or a vector, of degree 1 or 2.
-        facets: Local exterior facets, ghosts included.
+        V: Space of a scalar or a vector, of degree 1 or 2; it is cracked along the facets of a cut.
+        face: The facets, each with the cell to which it belongs.
 
     Attributes:
-        facets: The facets.
+        face: The facets.
         shape: Reference shape of the facets.
-        cells: Cell of each facet.
-        local: Number of the facet within its cell.
         owned: Which facets belong to a cell of this rank.
         nodes: Local nodes (blocked dofs) of each facet, in the order of `shape`.
         sides: For each facet ±1: whether its outward normal is that of its reference coordinates.
         reference: Positions of the nodes of each facet in the reference configuration [length].
     """
 
-    def __init__(self, V: fem.FunctionSpace, facets: NDArray[np.int32]) -> None:
+    def __init__(self, V: fem.FunctionSpace, face: Face) -> None:
         mesh = V.mesh
-        self.V, self.facets, gdim = V, facets, mesh.geometry.dim
-        self.cells, self.local = _cells_of(mesh, facets)
-        self.owned = self.cells < mesh.topology.index_map(mesh.topology.dim).size_local
+        self.V, self.face, gdim = V, face, mesh.geometry.dim
+        self.owned = face.cells < mesh.topology.index_map(mesh.topology.dim).size_local
         self.shape, orders = _facet_orders(V)
         dofs = V.dofmap.list
-        self.nodes: NDArray[np.int32] = dofs[self.cells[:, None], orders[self.local]]
+        self.nodes: NDArray[np.int32] = dofs[face.cells[:, None], orders[face.local]]
         x = V.tabulate_dof_coordinates()[:, :gdim]
         self.reference = x[self.nodes]
-        inside = x[dofs[self.cells]].mean(axis=1)
+        inside = x[dofs[face.cells]].mean(axis=1)
         tangents = np.einsum("ab,fbi->fai", self.shape.values(self.shape.centre[None])[1][0], self.reference)
         outward = self.reference.mean(axis=1) - inside
         self.sides = np.sign(np.einsum("fi,fi->f", normals(tangents), outward))
@@ -69,18 +65,19 @@ class OuterSurface:
 
 
 class SlaveSurface(OuterSurface):
-    """Outer surface with integration points, whose partners on a master surface are looked for.
+    """Surface with integration points, whose partners on a master surface are looked for.
 
     Args:
         V: As of `OuterSurface`.
+        face: As of `OuterSurface`.
         points: Integration points of the facets.
 
     Attributes:
         places: Places of the points, flattened over the facets.
     """
 
-    def __init__(self, V: fem.FunctionSpace, points: FacetPoints) -> None:
-        super().__init__(V, points.facets)
+    def __init__(self, V: fem.FunctionSpace, face: Face, points: FacetPoints) -> None:
+        super().__init__(V, face.in_order_of(points.facets))
         self.places = points.flat_places
 
 
@@ -114,7 +111,7 @@ class SharedSurface:
         surface: The facets of this rank.
 
     Attributes:
-        surface: The facets of this rank.
+        face: The facets of this rank.
         shape, sides, reference: As of `OuterSurface`, for the facets of all ranks.
         global_nodes: Global nodes of each facet.
     """
@@ -122,7 +119,8 @@ class SharedSurface:
     def __init__(self, surface: OuterSurface) -> None:
         V = surface.V
         self._comm: MPI.Comm = V.mesh.comm
-        self.surface, self.shape, self._components = surface, surface.shape, V.dofmap.index_map_bs
+        self.face = surface.face
+        self._mesh, self.shape, self._components = V.mesh, surface.shape, V.dofmap.index_map_bs
         own = surface.owned
         parts = self._comm.allgather((surface.global_nodes[own], surface.sides[own], surface.reference[own]))
         self.global_nodes, self.sides, self.reference = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -146,8 +144,9 @@ class SharedSurface:
 
     def holds(self, points: Array, slave: OuterSurface) -> NDArray[np.bool_]:
         """Which points, on the facets of another surface, are in its body in the reference configuration."""
-        cells = np.repeat(slave.cells, len(points) // max(len(slave.cells), 1))
-        return inside_body(self.surface.V.mesh, points, cells, self.surface.cells)
+        cells = slave.face.cells
+        cells = np.repeat(cells, len(points) // max(len(cells), 1))
+        return inside_body(self._mesh, points, cells, self.face.cells)
 
 
 def normals(tangents: Array) -> Array:
@@ -155,16 +154,6 @@ def normals(tangents: Array) -> Array:
     if tangents.shape[-1] == 2:
         return np.stack([tangents[..., 0, 1], -tangents[..., 0, 0]], axis=-1)
     return np.asarray(np.cross(tangents[..., 0, :], tangents[..., 1, :]))
-
-
-def _cells_of(mesh: Mesh, facets: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The cell of each exterior facet, and its number therein."""
-    tdim = mesh.topology.dim
-    mesh.topology.create_connectivity(tdim - 1, tdim)
-    to_cells = mesh.topology.connectivity(tdim - 1, tdim)
-    cells = to_cells.array[to_cells.offsets[facets]]
-    per_cell = incidence(mesh, tdim, tdim - 1)[cells]
-    return cells, np.argmax(per_cell == np.asarray(facets)[:, None], axis=1).astype(np.int32)
 
 
 def _facet_orders(V: fem.FunctionSpace) -> tuple[FacetShape, NDArray[np.int32]]:

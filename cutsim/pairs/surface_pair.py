@@ -1,15 +1,19 @@
-"""Large sliding between two outer surfaces with different meshes (docs/theory.md §3.5; thesis 4.28–4.57)."""
+"""Large sliding between two surfaces with different meshes (docs/theory.md §3.5; thesis 4.28–4.57)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import ufl
+from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
+from cutsim.fields.faces import Face, rows
+from cutsim.fields.points import Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
@@ -17,24 +21,29 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import check_friction, completed
-from cutsim.pairs.outer_surface import SharedSurface, SlaveSurface
+from cutsim.pairs.outer_surface import OuterSurface, SharedSurface, SlaveSurface
 from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.partners import PairKinematics
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
 
 _AXES = "xyz"
 
+#: A surface: local exterior facets, ghosts included, or faces of cuts, or parts of both kinds.
+Parts = NDArray[np.int32] | Face | Sequence[NDArray[np.int32] | Face]
+
 
 class SurfacePair(Term):
-    """Contact, friction or cohesion between two outer surfaces; their meshes need not match.
+    """Contact, friction or cohesion between two surfaces, or of one with itself; their meshes need not match.
 
     The traction is integrated over the slave surface.  In two passes each surface is slave once, with half of the
-    traction: a uniform pressure is then transmitted almost uniformly.
+    traction: a uniform pressure is then transmitted almost uniformly.  A surface that meets itself is slave and master,
+    with half of the traction at each of its points.
 
     Args:
         state: Displacement, of degree 1 or 2, and time.
-        slave_facets: Local exterior facets of the slave surface, ghosts included; the finer or softer one.
-        master_facets: Those of the master surface.
+        slave_facets: The slave surface, the finer or softer one: local exterior facets, ghosts included, a face of a
+            crack (`Crack.face`) or of an open cut (`cutsim.fields.faces.Face.cut`), or a sequence of these.
+        master_facets: The master surface; None for a surface that may fold and meet itself.
         law: Cohesive law, with small sliding only; None for contact only.
         young: Young's modulus of the softer body, for the automatic penalty [stress].
         contact: Contact law; by default a penalty of 10 E/h.
@@ -46,21 +55,23 @@ class SurfacePair(Term):
             [length].
         allowed_slip: If given, augmentation until no sticking facet slides more than this in a step, in the mean
             [length].
-        two_pass: Whether each surface is slave once.
+        two_pass: Whether each surface is slave once; one that meets itself always is.
         search: Largest distance of a partner, on either side [length]; by default the mean size of the slave facets.
             Points that lie in the other body from the start, or come into it in a step, find theirs at any depth.
         name: Name in messages and output.
 
     Attributes:
-        passes: The slave against the master, and with two passes the other way round.
+        passes: Each part of the slave against the master, and with two passes the other way round.
+        signs: For each pass 1 if its points are on the slave surface, −1 if on the master.
+        folding: Whether the surface meets itself.
         facets: Local facets of slave and master, ghosts included.
         entities: Rows (cell, local facet), flattened, of the facets of both surfaces on this rank.
         contact: The contact law.
         normal_size: Mean size of the cells normal to the slave surface, the h of the penalty [length].
 
     Raises:
-        ValueError: A parameter is outside its range, a surface has no facets, both share a facet, or points lie in the
-            other body from the start without facing its surface.
+        ValueError: A parameter is outside its range, a surface has no facets, a side of a facet is there twice, or
+            points lie in the other body from the start without facing its surface.
     """
 
     symmetric = False
@@ -69,8 +80,8 @@ class SurfacePair(Term):
     def __init__(
         self,
         state: State,
-        slave_facets: NDArray[np.int32],
-        master_facets: NDArray[np.int32],
+        slave_facets: Parts,
+        master_facets: Parts | None = None,
         law: CohesiveLaw | None = None,
         *,
         young: float,
@@ -89,42 +100,49 @@ class SurfacePair(Term):
         require_number("allowed_slip", allowed_slip, positive.or_none)
         require_number("search", search, positive.or_none)
         require("small_sliding", small_sliding, small_sliding or law is None, "True with a cohesive law")
-        shared = state.mesh.comm.allreduce(len(np.intersect1d(slave_facets, master_facets)))
-        require("slave_facets", shared, shared == 0, "no facet of master_facets")
+        self.folding = master_facets is None
+        lasting = self.folding and small_sliding
+        require("small_sliding", small_sliding, not lasting, "False for a surface that meets itself")
         self.name, self.state, self.law = name, state, law
-        given = {"slave_facets": slave_facets, "master_facets": master_facets}
-        measures = [state.measures.exterior(facets, parameter) for parameter, facets in given.items()]
-        points = [slave_points(state, facets, ds) for facets, ds in zip(given.values(), measures, strict=True)]
-        sizes = [p.mean(facet_size(state.mesh, p.facets)) for p in points]
-        self.normal_size = points[0].mean(normal_size(state.mesh, points[0].facets))
+        slaves = _faces(state, slave_facets, "slave_facets")
+        masters = [] if master_facets is None else _faces(state, master_facets, "master_facets")
+        _check_apart(state, [*slaves, *masters])
+        size = _mean(state, slaves, facet_size)
+        self.normal_size = _mean(state, slaves, normal_size)
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
-            doubt_law(state.verdict, name, law, young, sizes[0])
+            doubt_law(state.verdict, name, law, young, size)
         rubbing = completed(friction, self.contact.stiffness) if friction else None
         laws = PairLaws(law, self.contact, rubbing, allowed_penetration, allowed_slip)
-        surfaces = [SlaveSurface(state.V, p) for p in points]
-        self.facets = tuple(p.facets for p in points)
-        self.entities = np.concatenate([np.column_stack([s.cells, s.local])[s.owned].ravel() for s in surfaces])
-        masters = [SharedSurface(s) for s in surfaces]
+        sides = [Face.joined(side or slaves) for side in (slaves, masters)]
+        self.facets = tuple(side.facets for side in sides)
+        owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
+        self.entities = rows([*slaves, *masters], owned).ravel()
+        back = masters if two_pass else []
+        self.signs = (1,) * len(slaves) + (-1,) * len(back)
+        shared = [SharedSurface(OuterSurface(state.V, side)) for side in (sides if back else sides[1:])]
         self.passes = tuple(
-            SurfacePass(
-                state,
-                f"{name} pass {i + 1}",
-                points[i],
-                PairKinematics(
-                    state.memory,
-                    f"{name} pass {i + 1}",
-                    surfaces[i],
-                    masters[1 - i],
-                    small_sliding=small_sliding,
-                    search=search or sizes[0],
-                    size=sizes[i],
-                ),
-                laws,
-                weight=0.5 if two_pass else 1.0,
-            )
-            for i in range(1 + two_pass)
+            self._pass(i, face, shared[-1 if i < len(slaves) else 0], laws, small_sliding, search or size)
+            for i, face in enumerate((*slaves, *back))
         )
+
+    def _pass(
+        self, i: int, face: Face, master: SharedSurface, laws: PairLaws, small_sliding: bool, search: float
+    ) -> SurfacePass:
+        """A part of one surface over all of the other one. Collective."""
+        state, name = self.state, f"{self.name} pass {i + 1}"
+        points = slave_points(state, face, "slave_facets" if self.signs[i] > 0 else "master_facets")
+        kinematics = PairKinematics(
+            state.memory,
+            name,
+            SlaveSurface(state.V, face, points),
+            master,
+            small_sliding=small_sliding,
+            search=search,
+            size=_mean(state, [face], facet_size),
+        )
+        weight = 0.5 if self.folding or -1 in self.signs else 1.0
+        return SurfacePass(state, name, points, kinematics, laws, weight=weight)
 
     @property
     def facet_energy(self) -> float:
@@ -169,8 +187,11 @@ class SurfacePair(Term):
         return max(p.history.damage_increment() for p in self.passes)
 
     def force(self) -> NDArray[np.float64]:
-        """Force on the slave surface in the trial state, each pass counted with its share [force]."""
-        return np.asarray(sum(p.force * sign for p, sign in zip(self.passes, (1.0, -1.0), strict=False)))
+        """Force on the slave surface in the trial state, each pass counted with its share [force].
+
+        That on a surface which meets itself is balanced: what is left of it says how unlike the two sides are.
+        """
+        return np.asarray(sum(p.force * sign for p, sign in zip(self.passes, self.signs, strict=True)))
 
     def penetration(self) -> float:
         """Largest penetration of a point over the normal mesh size. Collective."""
@@ -188,15 +209,42 @@ class SurfacePair(Term):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Force on the slave, pressed area, penetration, areas that stick and slip, broken area. Collective."""
-        kind = self.state.facet_measure
-        first, name = self.passes[0], self.name
-        pressed = first.history.trial["pressure"] > 0
-        columns = {f"{name}_force_{a}": (float(f), "force") for a, f in zip(_AXES, self.force(), strict=False)}
-        columns[f"{name}_pressed"] = (first.points.integral(pressed.astype(float)), kind)
+        name, kind = self.name, self.state.facet_measure
+        slaves = [p for p, sign in zip(self.passes, self.signs, strict=True) if sign > 0]
+        # of a surface that meets itself two sides of what is pressed are slaves
+        share = 0.5 if self.folding else 1.0
+        columns = {}
+        if not self.folding:
+            columns = {f"{name}_force_{a}": (float(f), "force") for a, f in zip(_AXES, self.force(), strict=False)}
+        pressed = sum(p.points.integral((p.history.trial["pressure"] > 0).astype(float)) for p in slaves)
+        columns[f"{name}_pressed"] = (share * pressed, kind)
         columns[f"{name}_penetration"] = (self.penetration(), "one")
-        if first.slip is not None:
-            areas = zip(("sticking", "slipping"), first.slip.areas(), strict=True)
-            columns |= {f"{name}_{what}": (area, kind) for what, area in areas}
+        areas = [p.slip.areas() for p in slaves if p.slip is not None]
+        for what, parts in zip(("sticking", "slipping"), zip(*areas, strict=True), strict=False):
+            columns[f"{name}_{what}"] = (share * sum(parts), kind)
         if self.law is not None:
-            columns[f"{name}_broken"] = (first.points.integral(first.history.trial["damage"]), kind)
+            broken = sum(p.points.integral(p.history.trial["damage"]) for p in slaves)
+            columns[f"{name}_broken"] = (broken, kind)
         return columns
+
+
+def _faces(state: State, given: Parts, name: str) -> list[Face]:
+    """The faces of a surface, the parameter of a name. Collective."""
+    parts = [given] if isinstance(given, np.ndarray | Face) else list(given)
+    require(name, given, bool(parts), "facets, a face, or a sequence of these that is not empty")
+    return [part if isinstance(part, Face) else Face.outer(state.mesh, part, name) for part in parts]
+
+
+def _check_apart(state: State, faces: Sequence[Face]) -> None:
+    """Refuse surfaces that share a side of a facet, which would meet itself. Collective."""
+    sides = rows(faces, state.mesh.topology.index_map(state.mesh.topology.dim).size_local)
+    twice = state.mesh.comm.allreduce(len(sides) - len(np.unique(sides, axis=0)))
+    require("slave_facets", f"{twice} facets", twice == 0, "no facet of master_facets, and none twice")
+
+
+def _mean(state: State, faces: Sequence[Face], measure: Callable[[Mesh, NDArray[np.int32]], Values]) -> float:
+    """Mean of a size of the facets of some faces. Collective."""
+    owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
+    own = np.concatenate([measure(state.mesh, face.facets)[face.cells < owned] for face in faces])
+    total, count = state.mesh.comm.allreduce(np.array([own.sum(), len(own)]), op=MPI.SUM)
+    return float(total / count)

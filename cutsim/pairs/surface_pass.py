@@ -1,13 +1,13 @@
 """Pass of a slave surface over a master surface: jump, law and forces of a step (docs/theory.md §3.5)."""
 
 import numpy as np
-import ufl
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import add_blocks
 from cutsim.base.checks import require
+from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
 from cutsim.interface.history import GAUSS, TRAPEZOID, InterfaceHistory
@@ -22,15 +22,16 @@ from cutsim.pairs.partners import DEGREES, PairKinematics
 _CHUNK = 10_000
 
 
-def slave_points(state: State, facets: NDArray[np.int32], measure: ufl.Measure) -> FacetPoints:
-    """The integration points of a slave surface, given by its local exterior facets, ghosts included. Collective.
+def slave_points(state: State, face: Face, name: str) -> FacetPoints:
+    """The integration points of a slave surface, the parameter of a name. Collective.
 
     Raises:
-        ValueError: The displacement is not of degree 1 or 2.
+        ValueError: The displacement is not of degree 1 or 2, or there are no facets.
     """
     degree = state.V.element.basix_element.degree
     require("degree", degree, degree in DEGREES, "1 or 2: fields on the surfaces of a pair")
-    return FacetPoints(state.mesh, facets, measure, interior=False, degree=DEGREES[degree], ordered=True)
+    measure = state.measures.face(face, name)
+    return FacetPoints(state.mesh, face.facets, measure, interior=False, degree=DEGREES[degree], ordered=True)
 
 
 class SurfacePass:

@@ -14,6 +14,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.memory import RememberedArray
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Assembler
+from cutsim.fields.faces import Face
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
@@ -120,12 +121,13 @@ class TriangulatedTool(RigidTool):
         gdim = state.mesh.geometry.dim
         require_number("search", search, positive.or_none)
         require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
-        points = slave_points(state, facets, state.measures.exterior(facets))
+        face = Face.outer(state.mesh, facets)
+        points = slave_points(state, face, "facets")
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, (self._position, self._rotation))
         self.contact, self.surface = contact, surface
         self._normal_size = points.mean(normal_size(state.mesh, points.facets))
-        slave = SlaveSurface(state.V, points)
+        slave = SlaveSurface(state.V, face, points)
         kinematics = PairKinematics(
             state.memory, name, slave, master, small_sliding=False, search=search or size, size=size
         )

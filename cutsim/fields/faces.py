@@ -1,0 +1,114 @@
+"""Facets that are seen from one of their cells: parts of the outer boundary, and faces of cuts."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+from dolfinx import la
+from dolfinx.mesh import Mesh
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.fields.sizes import incidence
+from cutsim.fields.space import crack_measure_entities
+
+
+@dataclass(frozen=True, eq=False)
+class Face:
+    """Facets, each with the cell on whose side it is; ghosts are included, as far as this rank knows their cell.
+
+    `outer` makes one of the outer boundary, `cut` one of two faces of a cut, and `cutsim.Crack.face` that of a crack.
+
+    Attributes:
+        facets: Local facets.
+        cells: Local cell of each.
+        local: Number of each facet within its cell.
+    """
+
+    facets: NDArray[np.int32]
+    cells: NDArray[np.int32]
+    local: NDArray[np.int32]
+
+    @classmethod
+    def outer(cls, mesh: Mesh, facets: NDArray[np.int32], name: str = "facets") -> Self:
+        """A part of the outer boundary. Collective.
+
+        Args:
+            mesh: The mesh.
+            facets: Local exterior facets, ghosts included.
+            name: Name of the parameter as the user wrote it.
+
+        Raises:
+            ValueError: Some of them are not on the outer boundary.
+        """
+        tdim = mesh.topology.dim
+        mesh.topology.create_connectivity(tdim - 1, tdim)
+        to_cells = mesh.topology.connectivity(tdim - 1, tdim)
+        facets = np.unique(np.asarray(facets, dtype=np.int32))
+        inner = mesh.comm.allreduce(int(np.count_nonzero(np.diff(to_cells.offsets)[facets] != 1)))
+        require(name, f"{inner} facets between two cells", inner == 0, "of the outer boundary, or a `Face` of a cut")
+        return cls._of(mesh, facets, to_cells.array[to_cells.offsets[facets]])
+
+    @classmethod
+    def cut(
+        cls,
+        mesh: Mesh,
+        facets: NDArray[np.int32] | Sequence[NDArray[np.int32]],
+        plus: NDArray[np.int32] | Sequence[float],
+        side: Literal["+", "-"],
+    ) -> Self:
+        """One face of a cut. Collective.
+
+        Args:
+            mesh: The mesh; on several ranks with ghost mode ``shared_facet``.
+            facets: Facets along which the space is cracked, as for `cutsim.cracked_space`.
+            plus: The '+' side, as for `cutsim.Crack`.
+            side: Which face.
+
+        Raises:
+            ValueError: As `cutsim.fields.space.crack_measure_entities`.
+        """
+        return cls.of_rows(mesh, crack_measure_entities(mesh, facets, plus), side)
+
+    @classmethod
+    def of_rows(cls, mesh: Mesh, entities: NDArray[np.int32], side: Literal["+", "-"]) -> Self:
+        """One face of the rows of `cutsim.fields.space.crack_measure_entities`. Collective."""
+        require("side", side, side in ("+", "-"), "'+' or '-'")
+        tdim = mesh.topology.dim
+        cells, local = entities.reshape(-1, 2, 2)[:, "+-".index(side)].T
+        # whoever owns a facet knows both its cells, and tells the ranks that hold it which of them is meant
+        meant = la.vector(mesh.topology.index_map(tdim - 1), dtype=np.int64)
+        meant.array[:] = -1
+        index_map = mesh.topology.index_map(tdim)
+        meant.array[incidence(mesh, tdim, tdim - 1)[cells, local]] = index_map.local_to_global(cells.astype(np.int32))
+        meant.scatter_forward()
+        facets = np.flatnonzero(meant.array >= 0).astype(np.int32)
+        found = np.asarray(index_map.global_to_local(meant.array[facets]), dtype=np.int32)
+        return cls._of(mesh, facets[found >= 0], found[found >= 0])
+
+    @classmethod
+    def _of(cls, mesh: Mesh, facets: NDArray[np.int32], cells: NDArray[np.int32]) -> Self:
+        tdim = mesh.topology.dim
+        local = np.argmax(incidence(mesh, tdim, tdim - 1)[cells] == facets[:, None], axis=1)
+        return cls(facets, np.asarray(cells, dtype=np.int32), local.astype(np.int32))
+
+    @classmethod
+    def joined(cls, faces: Sequence["Face"]) -> Self:
+        """Several of them as one; both faces of a cut have the same facets."""
+        return cls(*(np.concatenate([getattr(f, part) for f in faces]) for part in ("facets", "cells", "local")))
+
+    def some(self, rows: NDArray[np.integer]) -> "Face":
+        """Some of the facets, by their places."""
+        return Face(self.facets[rows], self.cells[rows], self.local[rows])
+
+    def in_order_of(self, facets: NDArray[np.int32]) -> "Face":
+        """The same facets, none of which is there twice, in another order."""
+        order = np.argsort(self.facets)
+        return self.some(order[np.searchsorted(self.facets, facets, sorter=order)])
+
+
+def rows(faces: Sequence[Face], cells: int) -> NDArray[np.int32]:
+    """Rows (cell, local facet) of faces, those in the first so many cells, which this rank owns."""
+    found = [np.column_stack([face.cells, face.local])[face.cells < cells] for face in faces]
+    return np.concatenate(found).astype(np.int32)
