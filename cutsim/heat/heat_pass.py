@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import add_blocks
+from cutsim.fields.faces import Face
 from cutsim.fields.points import Values
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.contact_heat import ContactHeat
@@ -26,6 +27,7 @@ class HeatPass:
     Args:
         temperature: The temperature.
         contact: The pass of the mechanical pair.
+        master: Its master surface.
         law: Law of exchange, '+' being the slave.
         name: Name in messages.
 
@@ -38,13 +40,14 @@ class HeatPass:
         self,
         temperature: Temperature,
         contact: SurfacePass,
+        master: Face,
         law: ContactHeat,
         name: str,
     ) -> None:
         self.contact, self._temperature, self._fraction = contact, temperature, law.fracture_fraction
         points, kinematics = contact.points, contact.kinematics
         self._slave = OuterSurface(temperature.space, kinematics.slave.face)
-        self._master = SharedSurface(OuterSurface(temperature.space, kinematics.master.face))
+        self._master = SharedSurface(OuterSurface(temperature.space, master))
         places = basix.make_quadrature(self._slave.shape.element.cell_type, points.degree)[0]
         self._own_values = np.tile(self._slave.shape.values(places)[0], (len(self._slave.owned), 1))
         self._facets: Indices = np.repeat(np.arange(len(self._slave.owned)), len(places))

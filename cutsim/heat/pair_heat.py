@@ -46,7 +46,7 @@ class PairHeat(ExchangeTerm):
             same = law.gamma_plus == law.gamma_minus
             require("law", law, same, "the same on both sides of a surface that meets itself")
         self.passes = tuple(
-            HeatPass(temperature, contact, law if sign > 0 else swapped, self.name)
+            HeatPass(temperature, contact, pair.sides[sign > 0], law if sign > 0 else swapped, self.name)
             for contact, sign in zip(pair.passes, pair.signs, strict=True)
         )
 

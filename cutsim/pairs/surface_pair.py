@@ -64,7 +64,7 @@ class SurfacePair(Term):
         passes: Each part of the slave against the master, and with two passes the other way round.
         signs: For each pass 1 if its points are on the slave surface, −1 if on the master.
         folding: Whether the surface meets itself.
-        facets: Local facets of slave and master, ghosts included.
+        sides: Slave and master surface.
         entities: Rows (cell, local facet), flattened, of the facets of both surfaces on this rank.
         contact: The contact law.
         normal_size: Mean size of the cells normal to the slave surface, the h of the penalty [length].
@@ -114,13 +114,12 @@ class SurfacePair(Term):
             doubt_law(state.verdict, name, law, young, size)
         rubbing = completed(friction, self.contact.stiffness) if friction else None
         laws = PairLaws(law, self.contact, rubbing, allowed_penetration, allowed_slip)
-        sides = [Face.joined(side or slaves) for side in (slaves, masters)]
-        self.facets = tuple(side.facets for side in sides)
+        self.sides = Face.joined(slaves), Face.joined(masters or slaves)
         owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
         self.entities = rows([*slaves, *masters], owned).ravel()
         back = masters if two_pass else []
         self.signs = (1,) * len(slaves) + (-1,) * len(back)
-        shared = [SharedSurface(OuterSurface(state.V, side)) for side in (sides if back else sides[1:])]
+        shared = [SharedSurface(OuterSurface(state.V, side)) for side in (self.sides if back else self.sides[1:])]
         self.passes = tuple(
             self._pass(i, face, shared[-1 if i < len(slaves) else 0], laws, small_sliding, search or size)
             for i, face in enumerate((*slaves, *back))
@@ -143,6 +142,11 @@ class SurfacePair(Term):
         )
         weight = 0.5 if self.folding or -1 in self.signs else 1.0
         return SurfacePass(state, name, points, kinematics, laws, weight=weight)
+
+    @property
+    def facets(self) -> Sequence[NDArray[np.int32]]:
+        """Local facets of slave and master, ghosts included."""
+        return [side.facets for side in self.sides]
 
     @property
     def facet_energy(self) -> float:
