@@ -22,7 +22,7 @@ WIDE = {
     "results.recording.Recording.__init__": 13,
     "commands.sweep.command": 10,
     "analysis.mechanics.Mechanics.__init__": 10,
-    "interface.crack.Crack.__init__": 10,
+    "interface.crack.Crack.__init__": 11,
     "fields.laminate.laminate": 9,
 }
 

@@ -54,9 +54,8 @@ class Crack(Term):
             other options `CrackFriction` is a term of its own, beside a crack without this.
         allowed_penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
         normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
-        closing: Whether closed faces press on each other where they met in the reference configuration. Faces that
-            slide by more than a facet need False, and a `SurfacePair` of the two `face`s beside the crack, which then
-            carries pressure and friction.
+        closing: Whether closed faces press on the points that they met in the reference configuration. Faces that slide
+            over each other need False, and a `SurfacePair` of the two beside the crack for pressure and friction.
 
     Attributes:
         young: Young's modulus of the softer neighbour [stress].
@@ -106,16 +105,9 @@ class Crack(Term):
         if law is not None:
             doubt_law(state.verdict, name, law, young, self.size)
         self.history = InterfaceHistory(state.memory, name, self.points, law)
-        augmented = allowed_penetration is not None
-        self.faces = CrackFaces(
-            state,
-            self.points,
-            self.history,
-            law,
-            self.contact if closing else None,
-            current=normal == "current",
-            augmented=augmented,
-        )
+        pressing = self.contact if closing else None
+        options = {"current": normal == "current", "augmented": allowed_penetration is not None}
+        self.faces = CrackFaces(state, self.points, self.history, law, pressing, **options)
         self.friction = CrackFriction(self, friction) if friction else None
 
     @property
