@@ -39,10 +39,9 @@ test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those 
 	scripts/run -n 1 -m pytest -n $(JOBS) --dist loadfile tests $(ARGS)
 	@$(MAKE) --no-print-directory test-mpi
 
-test-mpi: $(STAMP) ## run the tests marked mpi on 2 and 3 ranks
-	for ranks in 2 3; do \
-	    scripts/run -n $$ranks -m pytest -x -q -p no:cacheprovider -m mpi tests $(ARGS) || exit 1; \
-	done
+test-mpi: $(STAMP) ## run the tests marked mpi on 2 ranks, and on 3 with two sets of parameters each
+	scripts/run -n 2 -m pytest -x -q -p no:cacheprovider -m mpi tests $(ARGS)
+	scripts/run -n 3 -m pytest -x -q -p no:cacheprovider -m mpi --thin tests $(ARGS)
 
 bench: $(STAMP) ## print wall time, iterations and peak memory of the reference problems
 	for name in cube dcb blade sliding; do echo "== $$name"; \

@@ -1,12 +1,30 @@
 """Hooks and fixtures of all tests. What they share otherwise is in the package helpers."""
 
 import gc
+from itertools import groupby
 
 import pytest
 from mpi4py import MPI
 
 # their asserts show values, like those of the tests
 pytest.register_assert_rewrite("helpers")
+
+
+def pytest_addoption(parser):
+    """A run whose parameters were all tried on fewer ranks, or with another dolfinx, need not try them all again."""
+    parser.addoption("--thin", action="store_true", help="of each test, take its first and last set of parameters only")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Leave out what `--thin` leaves out, the same on all ranks."""
+    if not config.getoption("thin"):
+        return
+    kept = []
+    for _, sets in groupby(items, lambda item: (item.path, getattr(item, "originalname", item.name))):
+        first, *others = sets
+        kept += [first, *others[-1:]]
+    config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+    items[:] = kept
 
 
 def pytest_collection_finish():
