@@ -28,6 +28,7 @@ FILES_AND_CURVES = ("StressTest", "fit_material", "fit_simulation", "read_table"
 LATER = {
     ("Recording", "extra"),
     ("ToolPath", "position"),
+    ("ToolPath", "rotation"),
     ("run", "record"),
     ("run", "stop"),
     ("identify.fit_simulation", "simulate"),

@@ -10,6 +10,7 @@ from dataclasses import fields, is_dataclass
 import dolfinx.jit
 import gmsh
 import jsonschema
+import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
@@ -38,7 +39,9 @@ from cutsim.cases.json_schema import kinds_in
 from cutsim.cases.quantities import Converter, split
 from cutsim.cases.schema import CaseTables
 from cutsim.cases.schema_materials import in_units
+from cutsim.cases.schema_motion import Motion
 from cutsim.cases.scope import Scope
+from cutsim.cases.tools import path_of
 from cutsim.cases.validation import validated
 from cutsim.fields import meshing
 from cutsim.interface.cohesive import CohesiveLaw
@@ -251,6 +254,27 @@ def test_functions_of_time(written):
     assert pickle.loads(pickle.dumps((pull, press, die))) == (pull, press, die)
     with pytest.raises(ValueError, match=r"'1/t' cannot be evaluated \(float division by zero\) at t = 0"):
         read_case(written(PEELED.replace('"t/2"', '"1/(1 + t)"'))).supports["pull"].value.__class__("1/t")(0)
+
+
+def test_tools_turn(written):
+    """Motions are told apart by their keys; a rotation of its own is allowed beside one that does not turn."""
+    path = 'path = { start = [0, 3], velocity = [0, -1], angle = "90 deg", period = "2 s", pivot = [0, "1 cm"] }'
+    old = 'path = { times = [0, "1 s", 3], points = [[0, 3.1], [0, 2.8], [5, 2.8]] }'
+    text = PEELED.replace(old, path).replace('position = ["0", "3', 'rotation = "min(t, 2)*pi"\nposition = ["0", "3')
+    assert text.count("rotation") == 1 and path in text
+    case = read_case(written(text))
+    rocked, turned = (path_of(case.tools[name]) for name in ("roller", "die"))
+    assert rocked.rotation(0.5) == pytest.approx(np.pi / 2)
+    np.testing.assert_allclose(rocked.position(0.5), (0.01, 2.5 + 0.01), atol=1e-12)
+    assert turned.rotation(1.0) == pytest.approx(np.pi) and turned.position(1.0)[1] == pytest.approx(3 - 0.003)
+    space = {"start": [0, 0, 1], "velocity": [0, 0, -1], "draw": [0, 1, 0], "ratio": 3}
+    for table, place in (
+        (space, (0, 3, 0)),
+        ({"times": [0, 1], "points": [[0, 0, 1], [0, 3, 0]], "turns": [[0, 0, 0], [0, 0, "90 deg"]]}, (0, 3, 0)),
+        ({"start": [0, 3, 1], "velocity": [0, 0, -1], "stroke": [1, 0, 0], "period": 1}, (0, 3, 0)),
+    ):
+        made = TypeAdapter(Motion).validate_python(table, context=Scope({}, Units())).made()
+        np.testing.assert_allclose(made.position(1.0), place, atol=1e-12)
 
 
 def test_a_file_extends_another(written):

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from cutsim.base.rotations import rotation_matrix
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Plane, ToolPath
 from helpers.examples import TOOLS
@@ -234,12 +235,49 @@ def test_saw_goes_to_and_fro_by_its_stroke():
     np.testing.assert_allclose(places[-1], (0, 0, 0), atol=1e-12)
 
 
+def test_polyline_turns_between_its_points():
+    path = ToolPath.polyline([0, 2], [(0, 0), (1, 0)], [0.0, 0.5])
+    np.testing.assert_allclose([path.rotation(t) for t in (-1, 0.5, 3)], [[0], [0.125], [0.5]])
+    path = ToolPath.polyline([0, 2], [(0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 0.4, 1)])
+    np.testing.assert_allclose(path.rotation(1), (0, 0.2, 0.5))
+    assert ToolPath.polyline([0, 2], [(0, 0), (1, 0)]).rotation is None
+
+
+def test_slice_and_push_have_the_ratio_of_their_speeds():
+    path = ToolPath.slice_push((1, 0, 5), (0, 0, -2), (0, 3, 0), ratio=1.5)
+    np.testing.assert_allclose(path.position(2.0), (1, 6, 1))
+    assert path.rotation is None
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_rocking_keeps_the_pivot_on_its_way(dim):
+    """The pivot moves straight, whatever the angle; the tool turns by it to either side."""
+    start, v, pivot = np.ones(dim), np.arange(1.0, 1 + dim), np.array([2.0, -1.0, 0.5])[:dim]
+    axis = None if dim == 2 else (0, 0, 2)
+    path = ToolPath.rock(tuple(start), tuple(v), 0.4, 2.0, tuple(pivot), axis)
+    for t in (0.0, 0.3, 0.5, 1.5):
+        turn = path.rotation(t)
+        assert turn[-1] == pytest.approx(0.4 * np.sin(np.pi * t)) and len(turn) == (1 if dim == 2 else 3)
+        moved = path.position(t) + rotation_matrix(turn) @ pivot
+        np.testing.assert_allclose(moved, start + pivot + t * v, atol=1e-14)
+
+
 @pytest.mark.parametrize(
     ("make", "name"),
     [
         (lambda: ToolPath.polyline([0, 0], [(0, 0), (1, 1)]), "times"),
         (lambda: ToolPath.polyline([0, 1], [(0, 0)]), "points"),
+        (lambda: ToolPath.polyline([0, 1], [(0, 0), (1, 0)], [0.0]), "turns"),
+        (lambda: ToolPath.polyline([0, 1], [(0, 0), (1, 0)], [(0.0, 0.0)] * 2), "turns"),
         (lambda: ToolPath.saw((0,), (0,), (0,), 0.0), "period"),
+        (lambda: ToolPath.slice_push((0, 0), (0, -1), (1, 0), -1.0), "ratio"),
+        (lambda: ToolPath.slice_push((0, 0), (0, -1), (0, 0), 1.0), "draw"),
+        (lambda: ToolPath.slice_push((0, 0), (0, -1, 0), (1, 0), 1.0), "velocity"),
+        (lambda: ToolPath.rock((0, 0), (0, -1), 4.0, 1.0), "angle"),
+        (lambda: ToolPath.rock((0, 0), (0, -1), 0.1, 0.0), "period"),
+        (lambda: ToolPath.rock((0, 0), (0, -1), 0.1, 1.0, (1, 2, 3)), "pivot"),
+        (lambda: ToolPath.rock((0, 0), (0, -1), 0.1, 1.0, axis=(0, 0, 1)), "axis"),
+        (lambda: ToolPath.rock((0, 0, 0), (0, -1, 0), 0.1, 1.0), "axis"),
     ],
 )
 def test_refuses_what_is_no_path(make, name):

@@ -8,6 +8,8 @@ from cutsim.cases.keys import Keys
 from cutsim.cases.schema_parts import Tool, Weight
 
 _ABSOLUTE_ZERO = {"K": 0.0, "degC": -273.15}
+# vectors of the motions of tools
+_MOTIONS = ("start", "velocity", "stroke", "draw", "pivot", "axis")
 #: Where something is wrong, what, and the value.
 Problem = tuple[Keys, str, Any]
 
@@ -45,7 +47,7 @@ def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
         key, path = ("tools", name), tool.path
         yield (*key, "position"), tool.position
         yield from (((*key, "path", "points", i), p) for i, p in enumerate(getattr(path, "points", ())))
-        yield from (((*key, "path", part), getattr(path, part, None)) for part in ("start", "velocity", "stroke"))
+        yield from (((*key, "path", part), getattr(path, part, None)) for part in _MOTIONS)
         for part in getattr(type(tool.made), "directions", ()):
             yield (*key, part), getattr(tool, part)
     for table in ("supports", "loads"):
@@ -133,8 +135,8 @@ def _tools(valid: Mapping[str, Any]) -> Iterator[Problem]:
     for name, tool in tools.items():
         moved = (tool.position is not None) + (tool.path is not None)
         if name == inserted:
-            if moved or tool.surfaces:
-                yield ("tools", name), "must have neither surfaces nor position nor path: [insertion] gives them", None
+            if moved or tool.rotation is not None or tool.surfaces:
+                yield ("tools", name), "must have no surfaces and no motion: [insertion] gives them", None
             continue
         if not tool.surfaces:
             yield ("tools", name, "surfaces"), "missing, must be given: what the tool can touch", None

@@ -1,17 +1,16 @@
 """Schema of case files: bodies, cracks, pairs of surfaces, tools, supports and loads."""
 
-from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from cutsim.base.checks import require
-from cutsim.base.units import Density, Length, Number, Stress, Time, Velocity, Viscosity
+from cutsim.base.units import Density, Length, Number, Stress, Time, Viscosity
 from cutsim.cases.classes import classes
 from cutsim.cases.constructed import Constructed, FromTable, With
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyNames, ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
+from cutsim.cases.schema_motion import Motion, Rotation
 from cutsim.cases.tables import FORM, NONNEGATIVE, POSITIVE, Flag, Table, Varying, chosen_by
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
@@ -135,51 +134,6 @@ class Pair(Interface):
     search: Annotated[Length, POSITIVE] | None = None
 
 
-class Polyline(Table):
-    """Straight motion between points, at rest before the first and after the last time.
-
-    Args:
-        times: Increasing times [time].
-        points: A position for each [length].
-    """
-
-    times: tuple[Time, ...]
-    points: tuple[tuple[Length, ...], ...]
-
-    @model_validator(mode="after")
-    def _as_many(self) -> "Polyline":
-        if len(self.times) != len(self.points) or not self.times:
-            raise ValueError("must have as many points as times, at least one")
-        rising = all(a < b for a, b in pairwise(self.times))
-        require("times", list(self.times), rising, "increasing")
-        return self
-
-
-class Saw(Table):
-    """Constant velocity with a sinusoidal draw.
-
-    Args:
-        start: Position at time zero [length].
-        velocity: Feed velocity [length/time].
-        stroke: Full stroke of the sawing motion, a vector [length].
-        period: Duration of a stroke to and fro > 0 [time].
-    """
-
-    start: tuple[Length, ...]
-    velocity: tuple[Velocity, ...]
-    stroke: tuple[Length, ...]
-    period: Annotated[Time, POSITIVE]
-
-
-def _motion(value: Any) -> str:
-    return (
-        "<saw>" if isinstance(value, dict) and value.keys() & {"start", "velocity", "stroke", "period"} else "<points>"
-    )
-
-
-Motion = Annotated[Annotated[Polyline, Tag("<points>")] | Annotated[Saw, Tag("<saw>")], Discriminator(_motion)]
-
-
 class Tool(Constructed):
     """Rigid tool.
 
@@ -188,7 +142,9 @@ class Tool(Constructed):
         surfaces: Groups of outer facets, and faces of cracks such as "glue+", that it can touch. A tool that is
             inserted needs none.
         position: Position of its reference point, one number or expression in t a component [length].
-        path: Motion of its reference point, as points at times, or as feed with a sawing stroke.
+        rotation: Rotation about its reference point, one number or expression in t: an angle in the plane,
+            counterclockwise; in space three, the components of a rotation vector [rad].
+        path: Motion of its reference point, as points at times, or as a feed with a sawing stroke, a slice or rocking.
         corners: Times at which its velocity jumps; those of `path` are known [time].
         contact: Contact law; by default a penalty of 10 E/h, and that of an inserted tool is its own.
     """
@@ -196,6 +152,7 @@ class Tool(Constructed):
     friction: Annotated[Friction, NONNEGATIVE] = 0.0
     surfaces: Surfaces = ()
     position: tuple[Displacement, ...] | None = None
+    rotation: Rotation | None = None
     path: Motion | None = None
     corners: tuple[Time, ...] = ()
     contact: Contact | None = None

@@ -1,10 +1,12 @@
 """Rigid tools of a case."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from cutsim.base.checks import require
 from cutsim.bodies.solid import Solid
 from cutsim.cases import schema_parts as schema
 from cutsim.cases.bodies import softest
@@ -94,15 +96,26 @@ def _contact(shape: object, solids: tuple[Solid, ...], surfaces: list[Surface]) 
 
 
 def path_of(table: schema.Tool) -> ToolPath:
-    """Motion of the reference point of a tool."""
-    path = table.path
-    if isinstance(path, schema.Polyline):
-        return ToolPath.polyline(path.times, path.points)
-    if isinstance(path, schema.Saw):
-        return ToolPath.saw(path.start, path.velocity, path.stroke, path.period)
-    position = [function(value) for value in table.position or ()]
-    corners = {corner for value in table.position or () for corner in corners_of(value)}
-    return ToolPath(lambda t: np.array([f(t) for f in position]), tuple(sorted(corners | set(table.corners))))
+    """Motion of a tool.
+
+    Raises:
+        ValueError: A motion that turns has a rotation beside it, or a parameter of the motion is refused.
+    """
+    if table.path is not None:
+        path = table.path.made()
+    else:
+        position = [function(value) for value in table.position or ()]
+        path = ToolPath(lambda t: np.array([f(t) for f in position]), _corners(table.position or ()))
+    if table.rotation is None:
+        return replace(path, corners=tuple(sorted({*path.corners, *table.corners})))
+    require("rotation", "given", path.rotation is None, "left out: the path turns the tool")
+    values = table.rotation if isinstance(table.rotation, tuple) else (table.rotation,)
+    turns, corners = [function(value) for value in values], {*path.corners, *table.corners, *_corners(values)}
+    return replace(path, corners=tuple(sorted(corners)), rotation=lambda t: np.array([f(t) for f in turns]))
+
+
+def _corners(values: tuple[TimeValue, ...]) -> tuple[float, ...]:
+    return tuple(corner for value in values for corner in corners_of(value))
 
 
 def function(value: TimeValue) -> Callable[[float], float]:

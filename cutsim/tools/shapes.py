@@ -17,8 +17,18 @@ from dolfinx import default_scalar_type, fem
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
-from cutsim.base.checks import above, as_array, positive, require, require_number, require_numbers
+from cutsim.base.checks import (
+    above,
+    as_array,
+    between,
+    nonnegative,
+    positive,
+    require,
+    require_number,
+    require_numbers,
+)
 from cutsim.base.kinematics import Expr
+from cutsim.base.rotations import rotation_matrix
 from cutsim.base.signatures import checked
 from cutsim.base.units import Length
 
@@ -219,20 +229,35 @@ class ToolPath:
 
     @classmethod
     @checked
-    def polyline(cls, times: Sequence[float], points: Sequence[Sequence[float]]) -> "ToolPath":
+    def polyline(
+        cls,
+        times: Sequence[float],
+        points: Sequence[Sequence[float]],
+        turns: Sequence[float | Sequence[float]] | None = None,
+    ) -> "ToolPath":
         """Straight motion between points, at rest before the first and after the last time.
 
+        Args:
+            times: Increasing times [time].
+            points: A position for each [length].
+            turns: A rotation for each, an angle in the plane and a rotation vector in space, between which the angle or
+                the vector changes evenly [rad]; None for a tool that never turns.
+
         Raises:
-            ValueError: Times do not increase or their number differs from that of the points.
+            ValueError: Times do not increase or their number differs from that of the points or turns.
         """
         require_numbers("times", times)
         t = np.asarray(times, dtype=float)
         require("times", list(times), bool(np.all(np.diff(t) > 0)), "increasing")
         p = as_array("points", points)
-        require("points", p.shape, p.ndim == 2 and len(p) == len(t), f"one row for each of the {len(t)} times")
-        return cls(
-            lambda s: np.array([np.interp(s, t, p[:, i]) for i in range(p.shape[1])]), tuple(float(v) for v in t)
-        )
+        rows = f"one row for each of the {len(t)} times"
+        require("points", p.shape, p.ndim == 2 and len(p) == len(t), rows)
+        rotation = None
+        if turns is not None:
+            r = as_array("turns", turns).reshape(len(turns), -1)
+            require("turns", r.shape, r.shape in ((len(t), 1), (len(t), 3)), f"{rows}: an angle or a rotation vector")
+            rotation = _interpolated(t, r)
+        return cls(_interpolated(t, p), tuple(float(v) for v in t), rotation)
 
     @classmethod
     @checked
@@ -250,10 +275,84 @@ class ToolPath:
             velocity: Feed velocity [length/time].
             stroke: Full stroke of the sawing motion, a vector [length].
             period: Duration of a stroke to and fro > 0 [time].
+
+        Raises:
+            ValueError: A number is outside its range, or vectors have different lengths.
         """
         require_number("period", period, positive)
-        require_numbers("start", start)
-        for name, vector in {"velocity": velocity, "stroke": stroke}.items():
-            require_numbers(name, vector, length=len(start))
-        x, v, a = (np.asarray(w, dtype=float) for w in (start, velocity, stroke))
+        x, v, a = _vectors(start=start, velocity=velocity, stroke=stroke)
         return cls(lambda s: x + v * s + 0.5 * a * np.sin(2 * pi * s / period))
+
+    @classmethod
+    @checked
+    def slice_push(
+        cls, start: Sequence[float], velocity: Sequence[float], draw: Sequence[float], ratio: float
+    ) -> "ToolPath":
+        """Push with a slice along the edge at the same time: x₀ + t (v + ξ |v| draw/|draw|).
+
+        Args:
+            start: Position at time zero [length].
+            velocity: Velocity v of the push [length/time].
+            draw: Direction of the slice, that of the edge.
+            ratio: Slice–push ratio ξ ≥ 0, the speed along the edge over that of the push: the tangent of the angle
+                between push and motion (Atkins, Xu, Jeronimidis 2004) [–].
+
+        Raises:
+            ValueError: A number is outside its range, a direction is zero, or vectors have different lengths.
+        """
+        require_number("ratio", ratio, nonnegative)
+        x, v, e = _vectors(start=start, velocity=velocity, draw=draw)
+        e = np.asarray(unit_vector("draw", tuple(e)))
+        rate = v + ratio * np.linalg.norm(v) * e
+        return cls(lambda s: x + rate * s)
+
+    @classmethod
+    @checked
+    def rock(
+        cls,
+        start: Sequence[float],
+        velocity: Sequence[float],
+        angle: float,
+        period: float,
+        pivot: Sequence[float] | None = None,
+        axis: Sequence[float] | None = None,
+    ) -> "ToolPath":
+        """Constant velocity of a pivot, about which the tool rocks by the angle φ sin(2πt/period).
+
+        Args:
+            start: Position of the reference point at time zero [length].
+            velocity: Feed velocity of the pivot [length/time].
+            angle: Largest angle φ to either side, in [0, π) [rad].
+            period: Duration of a swing to and fro > 0 [time].
+            pivot: Pivot relative to the reference point at time zero; by default this point itself [length].
+            axis: Axis of the rotation in space; None in the plane.
+
+        Raises:
+            ValueError: A number is outside its range, vectors have different lengths, or the axis is missing.
+        """
+        require_number("angle", angle, between(0, pi, "[)", name="π rad"))
+        require_number("period", period, positive)
+        given = {} if pivot is None else {"pivot": pivot}
+        x, v, *arms = _vectors(start=start, velocity=velocity, **given)
+        arm = arms[0] if arms else np.zeros_like(x)
+        require("axis", axis, (axis is not None) == (len(x) == 3), "given in space, and None in the plane")
+        unit = np.ones(1) if axis is None else np.asarray(unit_vector("axis", tuple(axis)))
+        require("axis", axis, axis is None or len(unit) == 3, "a vector of 3 numbers")
+
+        def turn(s: float) -> NDArray[np.float64]:
+            return np.asarray(angle * np.sin(2 * pi * s / period) * unit)
+
+        return cls(lambda s: x + v * s + arm - rotation_matrix(turn(s)) @ arm, (), turn)
+
+
+def _vectors(**vectors: Sequence[float]) -> tuple[NDArray[np.float64], ...]:
+    """Vectors by the names of their parameters, all as long as the first."""
+    length = None
+    for name, vector in vectors.items():
+        require_numbers(name, vector, length=length)
+        length = len(vector)
+    return tuple(np.asarray(vector, dtype=float) for vector in vectors.values())
+
+
+def _interpolated(t: NDArray[np.float64], rows: NDArray[np.float64]) -> Callable[[float], NDArray[np.float64]]:
+    return lambda s: np.array([np.interp(s, t, column) for column in rows.T])

@@ -85,6 +85,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Temperature": {"space": "@scalars"},
     "ToolHeat": {"tool_temperature": 1.0},
     "ToolPath.polyline": {"times": [0.0, 1.0], "points": [(0.0, 0.0), (0.0, 1.0)]},
+    "ToolPath.rock": {"start": (0.0, 0.0), "velocity": (0.0, 1.0), "angle": 0.1},
+    "ToolPath.slice_push": {"start": (0.0, 0.0), "velocity": (0.0, 1.0), "draw": (1.0, 0.0)},
     "ToolPath.saw": {"start": (0.0, 0.0), "velocity": (0.0, 1.0), "stroke": (1.0, 0.0)},
     "Triangulation": {"points": "@corners", "facets": "@sides"},
     "Triangulation.read": {"file": "tool.stl"},
