@@ -64,6 +64,7 @@ from .materials.viscoelastic import Prony as Prony
 from .pairs.surface_pair import SurfacePair as SurfacePair
 from .results.checkpoint_file import CheckpointError as CheckpointError
 from .results.checkpoints import Checkpoints as Checkpoints
+from .results.iteration_table import IterationTable as IterationTable
 from .results.output import read_history as read_history
 from .results.pictures import draw_body as draw_body
 from .results.pictures import draw_stress as draw_stress

@@ -56,6 +56,17 @@ def test_page_has_the_numbers_and_needs_nothing_else(tmp_path):
         tmp_path, until=1.0, verdict="trusted", versions={"cutsim": "9.9"}, ranks=2, mesh={"cells": 77}, gain=0.25
     )
     (tmp_path / "case.toml").write_text(CASE)
+    titles = [
+        f"{name}{of} [{unit}]"
+        for name, unit in zip(("residual", "displacement", "energy"), ("N", "mm", "mJ"), strict=True)
+        for of in ("_initial", "", "_required")
+    ]
+    rows = [
+        "1,0.5,1,2,1,0.1,3,4,inf,5,6,inf",
+        "2,0.7,1,2,1.5,0.1,3,4,inf,5,6,inf",
+        "2,0.7,2,2,0.05,0.1,3,7e-9,inf,5,6,inf",
+    ]
+    (tmp_path / "iterations.csv").write_text("\n".join([",".join(["step,time [s],iteration", *titles]), *rows, ""]))
     for name in ("setup.png", "animation.mp4"):
         (tmp_path / name).write_bytes(b"a picture")
     page = Page(present(tmp_path, animation=False))
@@ -64,6 +75,8 @@ def test_page_has_the_numbers_and_needs_nothing_else(tmp_path):
     assert start < 60 and "largest force 3 N" in words and "at depth 1 mm" in words and "0.01 %" in words
     assert "Numbers without a unit are in mm, N, s, K" in words and "young 0.8 MPa" in words and "0.1*t" in words
     assert "cells 77" in words and "gain 0.25" in words and "cutsim run case.toml -n 2 with cutsim 9.9 and" in words
+    assert "hardest step, 2 at 0.7 s iteration norm initial current required 1 energy [mJ] 5.000000e+00" in words
+    assert "2 displacement [mm] 3.000000e+00 7.000000e-09 – 2 residual [N]" in words
     assert "Not in this report" not in words
     assert {address.partition(":")[0] for address in page.loaded} == {"data"}
     kinds = [address[5:].partition(";")[0] for address in page.loaded]

@@ -43,6 +43,19 @@ def test_a_run_leaves_its_case_history_and_summary(folder):
     assert (summary["ranks"], summary["verdict"]) == (COMM.size, "trusted")
     assert summary["mesh"]["cells"] > 0 and summary["unknowns"] > 3000 and "dolfinx" in summary["versions"]
     assert list((folder / "checkpoint").glob("*.h5"))
+    assert len(iterations_of(folder, history)) == history["newton"].sum() >= 10
+
+
+def iterations_of(folder, history):
+    """Iterations of all steps, in order, each step ending where its residual is as small as it has to be."""
+    table = read_history(folder / "iterations.csv")
+    last = np.append(table["iteration"][1:] == 1, True)
+    np.testing.assert_array_equal(table["step"][last], history["step"])
+    np.testing.assert_array_equal(table["iteration"][last], history["newton"])
+    assert np.all(table["residual"][last] <= table["residual_required"][last])
+    assert np.all(table["residual"] <= 1.01 * table["residual_initial"])
+    assert np.all(table["energy"][last] < 1e-6 * table["energy_initial"][last])
+    return table["step"]
 
 
 @pytest.mark.mpi
@@ -88,6 +101,7 @@ def test_an_interrupted_run_is_resumed(folder, monkeypatch):
     whole, parts = (read_history(folder / name / "history.csv") for name in ("whole", "parts"))
     for name in ("time", "upper_force", "energy_strain", "front"):
         np.testing.assert_allclose(parts[name], whole[name], rtol=1e-9, err_msg=name)
+    assert len(iterations_of(folder / "parts", parts)) == parts["newton"].sum()
     with pytest.raises(CheckpointError, match=r"another case: parameters\.opening = 0\.2 in place of 0\.3"):
         run_case(short({"parameters.opening": "0.3"}), folder / "parts", COMM, resume=True, quiet=True)
     assert ending_of_run(run_case(short({"output.every": "2"}), folder / "parts", COMM, resume=True, quiet=True)) == 0

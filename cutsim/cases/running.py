@@ -26,6 +26,7 @@ from cutsim.cases.refusals import refusing
 from cutsim.cases.sizes import mesh_sizes
 from cutsim.results.checkpoints import Checkpoints
 from cutsim.results.folder import CASE, CHECKPOINTS, SETUP, SUMMARY
+from cutsim.results.iteration_table import IterationTable
 from cutsim.results.output import claim_folder, on_root
 from cutsim.results.presentation import present
 from cutsim.results.recording import Recording
@@ -161,10 +162,12 @@ def _run(simulation: Simulation, recording: Recording) -> Exception | KeyboardIn
     try:
         with (
             recording,
+            IterationTable(recording.folder, problem, simulation.units) as iterations,
             Stages(recording.folder, problem, until, units=simulation.units, mirror=simulation.mirror) as stages,
         ):
 
             def record(report: StepReport) -> None:
+                iterations(report)  # before a checkpoint, which counts its rows
                 recording(report)
                 stages(report)
 

@@ -6,6 +6,8 @@ from pathlib import Path
 CASE = "case.toml"
 #: Rows of the accepted steps.
 HISTORY = "history.csv"
+#: Newton iterations of the accepted steps.
+ITERATIONS = "iterations.csv"
 #: Verdict and headline numbers.
 SUMMARY = "summary.json"
 #: Picture of the set-up.

@@ -86,7 +86,7 @@ class Recording:
     ) -> None:
         require_number("every", every, count())
         require_number("until", until, above(problem.state.time_old, "the time of the state"))
-        self.folder, self.problem, self._units = Path(folder), problem, _units(problem, units)
+        self.folder, self.problem, self._units = Path(folder), problem, history_units(problem, units)
         self._title, self._until, self._values = title, until, dict[str, Any]()
         self._show, self._extra = dict(show or {}), extra
         self._checkpoints, self._stack = checkpoints, ExitStack()
@@ -211,7 +211,8 @@ class Recording:
         self._progress.say(f"{self._title}: {state.verdict}")
 
 
-def _units(problem: Problem, units: Units | None) -> Units:
+def history_units(problem: Problem, units: Units | None) -> Units:
+    """Units of the history of a problem: in a plane one, forces and energies are per width."""
     units, state = units or Units(), problem.state
     return units.per_width() if state.mesh.geometry.dim == 2 and not state.axisymmetric else units
 

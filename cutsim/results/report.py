@@ -16,6 +16,7 @@ from plotly.offline import get_plotlyjs
 
 from cutsim.base.files import replace_file
 from cutsim.results.folder import GIF, MP4, REPORT, SETUP, STAGES, has_checkpoint
+from cutsim.results.iteration_table import hardest_step
 from cutsim.results.overlay import Overlay
 from cutsim.results.run_files import RunFiles
 from cutsim.results.stages import read_stages
@@ -61,10 +62,11 @@ def write_report(folder: Path | str) -> Path:
     resumable = not run.complete and has_checkpoint(run.folder)
     missing += [words for name, words in _MISSED.items() if not content[name]]
     numbers = {name: _number(value) for name, value in run.summary.items() if name not in _PLACED}
+    hardest = _attempt("Newton iterations", lambda: hardest_step(folder), missing)
     content["heat"] = _attempt("audit of heat", lambda: heat_json(run.history), missing)
     page = _page(
         "run.html", run=run, tiles=tiles(run), sizes=dict(_sizes(run)), numbers=numbers, missing=missing,
-        resumable=resumable, **content,
+        resumable=resumable, hardest=hardest, **content,
     )  # fmt: skip
     return _written(run.folder / REPORT, page)
 

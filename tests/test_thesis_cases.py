@@ -1,0 +1,97 @@
+"""Built-in cases that are problems of the thesis: their numbers against closed forms."""
+
+from math import e, exp, sqrt
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from scipy.optimize import brentq, minimize_scalar
+
+from cutsim.cases import built_in_cases, read_case
+
+COMM = MPI.COMM_WORLD
+CASES = {name: path for name, (_, path) in built_in_cases().items()}
+
+
+def rows(name, **changes):
+    """History of a built-in case in its quick form, with some values changed."""
+    simulation, found = read_case(CASES[name], changes, quick=True).build(COMM), {}
+
+    def record(report):
+        for column, (value, _) in {**report.columns, **simulation.columns(report.columns)}.items():
+            found.setdefault(column, []).append(value)
+
+    simulation.run(record)
+    return {column: np.array(values) for column, values in found.items()}
+
+
+# -- two boxes --------------------------------------------------------------------------------------------------------
+
+STRENGTH, OPENING, AREA = 200.0, 0.001, 100.0
+FEW = {"steps.first": "0.1", "steps.largest": "0.1", "mesh.set.n": "2"}
+
+
+@pytest.mark.parametrize("m", [2, 3])
+def test_boxes_drawn_apart_follow_the_law(m):
+    """Force x e^(1−x) t A and spent work (1 − (1 + x + x²/2) e^(−x)) e t ε A belong to one opening x."""
+    found = rows("boxes", **FEW, **{"mesh.set.m": str(m)})
+    force = found["pull_force"][-1] / STRENGTH / AREA
+    x = brentq(lambda x: x * exp(1 - x) - force, 1.5, 20.0)
+    spent = (1 - (1 + x + x**2 / 2) * exp(-x)) * e * STRENGTH * OPENING * AREA
+    assert 4.5 < x < 5.0
+    assert found["energy_fracture"][-1] == pytest.approx(spent, rel=2e-3)
+
+
+@pytest.mark.parametrize("m", [2, 3])
+def test_boxes_sheared_off_rub_on_each_other(m):
+    """Of the bond its whole work of separation √(e/2) t ε is spent; then the force is that of friction."""
+    changes = {"parameters.open": "0", "parameters.slide": "1", "parameters.press": "1e-4", "mesh.set.m": str(m)}
+    found = rows("boxes", **FEW, **changes)
+    whole = sqrt(e / 2) * STRENGTH * OPENING * AREA
+    assert found["energy_fracture"][-1] == pytest.approx(whole, rel=2e-3)
+    assert found["push_force"][-1] == pytest.approx(-0.3 * found["pull_force"][-1], rel=2e-3)
+    assert -found["pull_force"][-1] > 1000.0
+
+
+# -- tear test --------------------------------------------------------------------------------------------------------
+
+
+def drawn(stretch, bulk):
+    """Energy of a bar of the solid of Mooney and Rivlin, C1 = C2 = 1, that is free to contract."""
+
+    def energy(across):
+        volume, squares = stretch * across**2, np.array([stretch, across, across]) ** 2
+        first, second = squares.sum(), volume**2 * (1 / squares).sum()
+        return first * volume ** (-2 / 3) + second * volume ** (-4 / 3) - 6 + bulk / 2 * np.log(volume) ** 2
+
+    return minimize_scalar(energy, (0.1, 2.0), options={"xtol": 1e-10}).fun
+
+
+def nominal_stress(stretch, bulk):
+    return (drawn(stretch + 1e-3, bulk) - drawn(stretch - 1e-3, bulk)) / 2e-3
+
+
+def test_a_bar_tears_at_its_strength():
+    """At the stretch at which its nominal stress reaches it; all of the toughness is spent, the halves fly back."""
+    coarse = {"mesh.set.lc": "5", "mesh.set.band": "10", "mesh.set.nz": "1", "mesh.set.growth": "2"}
+    found = rows("tear-bar", **coarse, **{"steps.largest": "1e-3"})
+    stretch = brentq(lambda x: nominal_stress(x, 48.0) - 5.0, 1.5, 2.5)
+    whole = found["crack_broken"] < 0.9 * 25  # before the halves swing
+    peak = found["pull_force"][whole].argmax()
+    assert found["pull_force"][peak] == pytest.approx(5.0 * 25, rel=0.02)
+    opening = 28.3 / e / 5.0  # of the bond, where its traction is largest
+    assert found["pull_displacement"][peak] == pytest.approx(20 * (stretch - 1) + opening / 2, rel=0.02)
+    assert found["energy_fracture"][-1] == pytest.approx(28.3 * 25, rel=1e-3)
+    assert abs(found["energy_closure"][whole]).max() < 2e-3
+    assert found["energy_kinetic"].max() > 0.3 * found["energy_strain"].max(), "the halves fly back"
+
+
+def test_a_bar_of_the_printed_solid_cannot_tear():
+    """Its nominal stress goes through a maximum far below the printed strength of 200 MPa, and of the corrected one."""
+    one = {"mesh.set.lc": "5", "mesh.set.band": "19", "mesh.set.nz": "1", "mesh.set.growth": "100"}
+    changes = {"material.bulk": "0.48", "parameters.stretch": "8", "analysis.type": "quasi-static"}
+    found = rows("tear-bar", **one, **changes, **{"steps.first": "0.01", "steps.largest": "0.01"})
+    largest = max(nominal_stress(stretch, 0.48) for stretch in np.linspace(1.05, 8.0, 140))
+    assert 1.15 < largest < 1.18
+    assert found["pull_force"].max() == pytest.approx(25 * largest, rel=0.02)
+    assert found["pull_force"][-1] < 0.8 * found["pull_force"].max() and not found["crack_broken"].any()
