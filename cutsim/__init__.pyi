@@ -41,6 +41,7 @@ from .interface.crack_friction import CrackFriction as CrackFriction
 from .interface.friction import Coulomb as Coulomb
 from .interface.friction import FrictionLaw as FrictionLaw
 from .interface.friction import SmoothCoulomb as SmoothCoulomb
+from .interface.polynomial import Polynomial as Polynomial
 from .interface.ppr import ParkPaulinoRoesler as ParkPaulinoRoesler
 from .materials.anisotropic import FungOrthotropic as FungOrthotropic
 from .materials.anisotropic import TransverselyIsotropic as TransverselyIsotropic

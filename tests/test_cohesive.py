@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cutsim.interface.cohesive import Bilinear, Exponential, process_zone_element
+from cutsim.interface.damage import damage, spent, strength_loss
 from cutsim.interface.dissipation import Way, losses
 from helpers.examples import LAWS
 from helpers.laws import BILINEAR, EXPONENTIAL, PPR, PROPORTIONAL, TRAPEZOIDAL
@@ -95,7 +96,7 @@ def test_another_stiffness_in_sliding():
     ):  # of the work, along straight ways: damage begins at the same part of the toughness
         toughness = 0.2 + 0.3 * mix**1.7
         way = np.linspace(0, 1, 100_001) * 2 * 0.6
-        D = damage(PROPORTIONAL, way * sqrt(1 - mix), way * sqrt(mix) * scale)[0]
+        D = damaged(PROPORTIONAL, way * sqrt(1 - mix), way * sqrt(mix) * scale)[0]
         onset = way[np.argmax(D > 1e-9)]
         assert 0.5 * 200.0 * onset**2 == pytest.approx(toughness * 2.0**2 / (2 * 200.0 * 0.2), rel=1e-2)
     with pytest.raises(ValueError, match=r"shear_penalty = 9.0 .* shear_strength²/\(2 shear_toughness\) = 9"):
@@ -109,14 +110,14 @@ def test_toughness_at_a_mode_ratio_is_that_of_benzeggagh_and_kenane_whatever_the
     law = make(400.0, 2.0, 0.2, strength, 0.5, 1.7)
     stiffer = (law.shear_penalty or law.penalty) / law.penalty
     end = np.array([sqrt(1 - mix), sqrt(mix / stiffer)])
-    assert spent(law, np.array([[0.0, 0.0], 50 * end]))[0] == pytest.approx(0.2 + 0.3 * mix**1.7, rel=1e-7)
+    assert lost_in(law, np.array([[0.0, 0.0], 50 * end]))[0] == pytest.approx(0.2 + 0.3 * mix**1.7, rel=1e-7)
 
 
 def test_work_of_a_way_that_changes_its_mode_and_the_strengths():
     """Opened to half the toughness, then slid: in proportion the work is the same for any shear strength."""
     way = np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 2.0]])
     works = {
-        make: [spent(make(4000.0, 2.0, 0.2, t_t, 0.5, 1.7), way).sum() for t_t in (1.0, 2.0, 6.0)]
+        make: [lost_in(make(4000.0, 2.0, 0.2, t_t, 0.5, 1.7), way).sum() for t_t in (1.0, 2.0, 6.0)]
         for make in (Bilinear, Bilinear.proportional)
     }
     assert np.ptp(works[Bilinear.proportional]) < 1e-7 * works[Bilinear.proportional][0]
@@ -124,22 +125,59 @@ def test_work_of_a_way_that_changes_its_mode_and_the_strengths():
     assert max(works[Bilinear]) > 0.5 > 0.2 > min(works[Bilinear]), "with one stiffness not even between both modes"
 
 
-def damage(law, opening, sliding):
-    return law.damage(*law.secants(np.asarray(opening, dtype=float), np.asarray(sliding, dtype=float)))
+def damaged(law, opening, sliding):
+    return damage(law, *law.secants(np.asarray(opening, dtype=float), np.asarray(sliding, dtype=float)))
 
 
-def test_damage_of_the_exponential_law_is_its_loss_of_strength():
-    """1 − T/t after the peak of each pure mode (thesis 4.26, 4.27)."""
-    law = EXPONENTIAL
-    x, y = np.array([0.5, 1, 1.5, 2, 3, 5, 800]), np.array([0.5, sqrt(0.5), 1.0, 1.5, 2, 40])
-    opened = np.where(x > 1, 1 - x * np.exp(1 - x), 0)
-    slid = np.where(y > sqrt(0.5), 1 - sqrt(2) * y * np.exp(0.5 - y**2), 0)
-    np.testing.assert_allclose(damage(law, x * law.opening, 0 * x)[0], opened, atol=1e-12)
-    np.testing.assert_allclose(damage(law, 0 * y, y * law.shear_opening)[1], slid, atol=1e-12)
+# δ/ε; opening: damage (4.26), loss of strength, fraction of φ_n dissipated; sliding: damage (4.27), loss of strength.
+# Computed apart from this program, by the closed forms 1 − e^{1−x}, 1 − x e^{1−x}, 1 − (1 + x + x²/2) e^{−x},
+# 1 − e^{1−y²} and 1 − √2 y e^{1/2−y²}
+MEASURES = np.array(
+    [
+        (0.25, 0, 0, 0.0021615, 0, 0),
+        (0.75, 0, 0, 0.0405054, 0, 0.00360198),
+        (1, 0, 0, 0.0803014, 0, 0.142236),
+        (1.25, 0.221199, 0.026499, 0.131532, 0.430217, 0.389076),
+        (1.5, 0.393469, 0.090204, 0.191153, 0.713495, 0.63137),
+        (2, 0.632121, 0.264241, 0.323324, 0.950213, 0.914589),
+        (3, 0.864665, 0.593994, 0.57681, 0.999665, 0.999137),
+        (5, 0.981684, 0.908422, 0.875348, 1, 1),
+        (8, 0.999088, 0.992705, 0.986246, 1, 1),
+    ]
+)
 
 
-def test_damage_of_the_bilinear_law_is_its_loss_of_stiffness():
-    assert [float(D) for D in BILINEAR.damage(0.6 * 200.0, 0.3 * 200.0)] == pytest.approx([0.4, 0.7])
+def test_three_measures_of_the_exponential_law():
+    """Damage, loss of strength and work spent of the pure modes, against tabulated values."""
+    law, (x, *opening), sliding = EXPONENTIAL, MEASURES[:, :4].T, MEASURES[:, 4:].T
+    secants = np.column_stack([law.secants(x * law.opening, 0 * x)[0], law.secants(0 * x, x * law.shear_opening)[1]])
+    D = damage(law, *secants.T)
+    lost, work = strength_loss(law, secants), spent(law, secants)
+    for found, expected in zip((D[0], lost[:, 0], work[:, 0], D[1], lost[:, 1]), (*opening, *sliding), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+
+
+def test_three_measures_of_linear_softening():
+    """Bilinear: damage d; 1 − T/t falls with the jump; lost at d is the triangle between onset, peak and jump."""
+    law, d = BILINEAR, np.array([0.0, 0.4, 0.9, 1.0])
+    for mode, (K, t, phi) in enumerate(((200.0, 2.0, 0.2), (200.0, 3.0, 0.5))):
+        first, final = t / K, 2 * phi / t
+        jump = first * final / (final - d * (final - first))
+        secants = np.column_stack([(1 - d) * K, (1 - d) * K])
+        np.testing.assert_allclose(damage(law, *secants.T)[mode], d, atol=1e-14)
+        np.testing.assert_allclose(strength_loss(law, secants)[:, mode], (jump - first) / (final - first), atol=1e-9)
+        lost = 0.5 * t * (jump - first) * (final / (final - first))
+        np.testing.assert_allclose(spent(law, secants)[:, mode], lost / phi, atol=1e-9)
+
+
+@each
+def test_measures_never_fall_and_keep_their_order(law):
+    """From 0 to 1; what has lost stiffness since the characteristic opening may still be as strong as ever."""
+    jumps = np.geomspace(1e-3, 1e3, 200) * law.opening
+    secants = np.transpose(law.secants(jumps, 2 * jumps))
+    for measure in (np.transpose(damage(law, *secants.T)), strength_loss(law, secants), spent(law, secants)):
+        assert (np.diff(measure, axis=0) >= -1e-9).all()
+        np.testing.assert_allclose(measure[[0, -1]], [[0, 0], [1, 1]], atol=1e-5)
 
 
 @each
@@ -147,7 +185,7 @@ def test_secants_fall_and_damage_grows(law):
     """In both jumps; from zero where the bond is intact to one where nothing is left of it."""
     jumps = np.linspace(0, 1, 201) * 60 * law.opening
     opening, sliding = np.meshgrid(jumps, 2 * jumps, indexing="ij")
-    for secant, D in zip(law.secants(opening, sliding), damage(law, opening, sliding), strict=True):
+    for secant, D in zip(law.secants(opening, sliding), damaged(law, opening, sliding), strict=True):
         assert (np.diff(secant, axis=0) <= 1e-12 * secant[0, 0]).all()
         assert (np.diff(secant, axis=1) <= 1e-12 * secant[0, 0]).all()
         assert (secant >= 0).all() and D[0, 0] == pytest.approx(0, abs=1e-12) and D.min() >= -1e-12
@@ -167,7 +205,7 @@ def memory_along(law, jumps):
     return np.minimum.accumulate(secants, axis=0)
 
 
-def spent(law, jumps):
+def lost_in(law, jumps):
     """What is lost in each leg of a path of jumps, one step a leg."""
     return losses(law, Way(jumps[:-1], jumps[1:]), memory_along(law, jumps)[:-1])
 
@@ -190,7 +228,7 @@ def stored(law, jumps):
 def test_a_jump_of_any_size_spends_the_toughness(law, mode, size):
     end = size * law.opening * np.eye(2)[mode]
     toughness = (law.toughness, law.shear_toughness)[mode]
-    assert spent(law, np.array([[0.0, 0.0], end]))[0] == pytest.approx(toughness, rel=1e-9)
+    assert lost_in(law, np.array([[0.0, 0.0], end]))[0] == pytest.approx(toughness, rel=1e-9)
 
 
 def test_no_kink_is_missed_wherever_it_lies_in_a_step():
@@ -214,9 +252,9 @@ def test_no_path_gives_energy_back(law, seed):
     """24 random legs: no leg gains, a step a leg is as good as 40, and work = stored + lost."""
     rng = np.random.default_rng(seed)
     legs = np.vstack([np.zeros(3), rng.uniform(-0.5, 3, (24, 3)) * law.opening * (1, 2, 2)])
-    lost = spent(law, legs)
+    lost = lost_in(law, legs)
     assert (lost >= 0).all()
-    assert spent(law, divided(legs, 40)).sum() == pytest.approx(lost.sum(), rel=1e-8)
+    assert lost_in(law, divided(legs, 40)).sum() == pytest.approx(lost.sum(), rel=1e-8)
     # the work from the tractions alone, by the trapezoidal rule on a much finer path
     finer = divided(legs, 4000)
     traction = memory_along(law, finer)[:, [0, 1, 1]] * np.column_stack([np.maximum(finer[:, 0], 0), finer[:, 1:]])
@@ -231,7 +269,7 @@ def test_a_closed_cycle_below_the_history_costs_nothing(law):
     corners = np.array([[0, 0], [0, t], [1.6 * n, t], [1.6 * n, 0]])
     for cycle in (corners, corners[::-1]):
         path = np.vstack([[[0, 0], [2 * n, 0]], np.tile(cycle, (4, 1)), [[0, 0]]])
-        lost = spent(law, path)
+        lost = lost_in(law, path)
         assert lost[:6].sum() > 0
         assert lost[6:].sum() < 1e-12 * law.toughness
 
@@ -245,7 +283,7 @@ def test_work_of_mixed_paths(corner, end, total):
     """Known for φ_t = 1.7 φ_n."""
     law = Exponential(toughness=1.0, opening=0.1, shear_toughness=1.7, shear_opening=0.2)
     path = np.array([(0, 0), corner, end]) * (law.opening, law.shear_opening)
-    assert spent(law, path).sum() + stored(law, path) == pytest.approx(total, abs=2e-8)
+    assert lost_in(law, path).sum() + stored(law, path) == pytest.approx(total, abs=2e-8)
 
 
 @pytest.mark.parametrize(

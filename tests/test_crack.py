@@ -15,6 +15,7 @@ from cutsim.base.compat import form
 from cutsim.bodies.loads import Support
 from cutsim.interface.cohesive import Bilinear, Exponential
 from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.polynomial import Polynomial
 from cutsim.interface.ppr import ParkPaulinoRoesler
 from cutsim.materials.elastic import NeoHookean, StVenantKirchhoff
 from cutsim.materials.rubbers import MooneyRivlin
@@ -69,6 +70,16 @@ def ppr(law, sliding, opening):
     return dg * along, df * across
 
 
+def polynomial(law, sliding, opening):
+    """Tvergaard (1990), written anew: tractions on the envelope, from the final jumps 16 φ/(9 t)."""
+    n, t = (
+        9 * law.strength * opening / (16 * law.toughness),
+        9 * law.shear_strength * sliding / (16 * law.shear_toughness),
+    )
+    left = 27 / 4 * (1 - min(np.hypot(n, t), 1)) ** 2
+    return law.shear_strength * t * left, law.strength * n * left
+
+
 def own(law, sliding, opening):
     """Tractions on the envelope by the law itself."""
     k_n, k_t = law.secants(opening, sliding)
@@ -94,7 +105,7 @@ LOOPS = {
     "pressed sliding": [(0, 0), (0, -0.05), (1.2, -0.05), (-0.5, -0.05), (6, -0.05)],
 }
 #: The laws that are written anew here; of others what they say of themselves is compared with what the crack does.
-ENVELOPES = {Exponential: exponential, Bilinear: bilinear, ParkPaulinoRoesler: ppr}
+ENVELOPES = {Exponential: exponential, Bilinear: bilinear, ParkPaulinoRoesler: ppr, Polynomial: polynomial}
 
 
 @pytest.mark.parametrize("gdim", [2, 3])

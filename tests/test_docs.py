@@ -130,18 +130,18 @@ def test_tangent_of_material(material, gdim):
 
 def test_law_peaks_and_spends_its_toughness(law):
     assert isinstance(law, CohesiveLaw)
-    assert law.final == pytest.approx(0.4)
-    x = np.linspace(0, 1, 2001)[1:]
-    traction = law.secants(x * law.final, np.zeros(len(x)))[0] * x * law.final
-    np.testing.assert_allclose(traction, 27 / 4 * law.strength * x * (1 - x) ** 2, atol=1e-6)
+    assert law.opening == pytest.approx(0.45 / (2.0 * np.e))
+    x = np.linspace(0, 20, 4001)[1:]
+    traction = law.secants(x * law.opening, np.zeros(len(x)))[0] * x * law.opening
+    np.testing.assert_allclose(traction, law.strength * x * np.exp(1 - x), atol=1e-6)
     assert max(traction) == pytest.approx(law.strength, rel=1e-5)
-    assert np.trapezoid([0, *traction], [0, *x * law.final]) == pytest.approx(law.toughness, rel=1e-4)
+    assert np.trapezoid([0, *traction], [0, *x * law.opening]) == pytest.approx(law.toughness, rel=1e-4)
 
 
-@pytest.mark.parametrize("end", [(0.0, 0.5), (0.5, 0.0), (0.4, 0.3)], ids=["opening", "sliding", "mixed"])
+@pytest.mark.parametrize("end", [(0.0, 18.0), (18.0, 0.0), (14.4, 10.8)], ids=["opening", "sliding", "mixed"])
 def test_law_in_a_crack(law, end):
     """Broken, unloaded half way and reloaded, the finite-element crack has dissipated the toughness."""
-    path = np.array([(0, 0), np.multiply(end, 0.5), np.multiply(end, 0.1), end])
+    path = np.array([(0, 0), np.multiply(end, 0.3), np.multiply(end, 0.1), end]) * law.opening
     rows, _ = drag(law, path, steps=40)
     assert rows["energy_fracture"][-1] == pytest.approx(law.toughness, rel=1e-3)
     assert rows["crack_broken"][-1] == pytest.approx(1.0)

@@ -13,6 +13,7 @@ from cutsim.fields.space import cracked_space
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
+from cutsim.interface.damage import damage
 from cutsim.interface.friction import Coulomb, SmoothCoulomb
 from cutsim.materials.elastic import LinearElastic
 from cutsim.solvers.convergence import Tolerances
@@ -222,7 +223,7 @@ def test_where_friction_acts(acts_on, caplog):
         mechanics.evaluate()
         force = friction.slip.points.integral(friction.slip.values("traction")[..., 0] * friction.slip.values("share"))
         k_n, k_t = np.minimum(EXPONENTIAL.secants(past, 0.0), EXPONENTIAL.secants(max(opening, 0.0), slide))
-        broken = EXPONENTIAL.damage(k_n, k_t)[1]
+        broken = damage(EXPONENTIAL, k_n, k_t)[1]
         tension = k_n * max(opening, 0.0) if acts_on == "tension" else 0.0
         limit = MU * (NORMAL * max(-opening, 0.0) + tension)
         expected = limit * (float(broken) if acts_on == "broken" else 1.0)

@@ -110,13 +110,13 @@ class Front(Table):
         crack: Name of the crack.
         axis: Coordinate along which it grows, or "-x" and so on if it grows against it.
         quantity: Quantity that tells where the front is.
-        level: Level below which this falls at the front; one half of the damage by default.
+        level: Level below which this falls at the front; one half of the damage (4.26, 4.27) by default.
     """
 
     kind: Literal["front"]
     crack: CrackName
     axis: Literal["x", "y", "z", "-x", "-y", "-z"] = "x"
-    quantity: Literal["damage", "opening", "sliding"] = "damage"
+    quantity: Literal["damage", "strength_loss", "spent", "opening", "sliding"] = "damage"
     level: Number = 0.5
 
 

@@ -13,13 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutsim.base.checks import above, between, positive, require_number
-from cutsim.base.functions import exp, if_less, larger, log, sqrt
+from cutsim.base.functions import exp, if_less, sqrt
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.units import Length, Stiffness, Stress, Toughness
 
-_BROKEN = 1e-300  # secant over the intact one that stands for nothing
-_REST = 1e-16  # keeps the derivative of a root finite where it vanishes
 _AGREE = 1e-3  # relative disagreement of strength, opening and toughness that is still rounding
 
 
@@ -46,8 +44,9 @@ class CohesiveLaw(Protocol):
     def secants(self, opening: Expr, sliding: Expr) -> tuple[Expr, Expr]:
         """Secant stiffnesses (k_n, k_t) of the envelope [stress/length], non-increasing in both arguments ≥ 0."""
 
-    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
-        """Damage (D_n, D_t) in [0, 1] at the smallest secants so far, non-increasing in them."""
+    @property
+    def characteristic_secants(self) -> tuple[float, float]:
+        """Secant stiffnesses at the characteristic opening and sliding, from which damage counts [stress/length]."""
 
 
 def strength_and_opening(
@@ -154,13 +153,10 @@ class Exponential:
         k_t = sqrt(2 * e) * self.shear_strength / self.shear_opening * (1 + normal) * decay
         return k_n, k_t
 
-    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
-        """Loss of strength after the peak of each mode, of a bond with these secants in that mode alone."""
-        normal = -log(larger(k_n * self.opening / (e * self.strength), _BROKEN))
-        sliding = sqrt(-log(larger(k_t * self.shear_opening / (sqrt(2 * e) * self.shear_strength), _BROKEN)) + _REST)
-        D_n = 1 - normal * exp(1 - normal)
-        D_t = 1 - sqrt(2) * sliding * exp(0.5 - sliding**2)
-        return if_less(1.0, normal, D_n, 0.0), if_less(1 / sqrt(2), sliding, D_t, 0.0)
+    @property
+    def characteristic_secants(self) -> tuple[float, float]:
+        """t_n/ε_n at the opening ε_n, and √(2/e) t_t/ε_t at the sliding ε_t, which is beyond the peak."""
+        return self.strength / self.opening, sqrt(2 / e) * self.shear_strength / self.shear_opening
 
 
 class ByToughness:
@@ -291,9 +287,10 @@ class Bilinear(ByToughness):
         left = if_less(jump, onset, 1.0, if_less(jump, final, intact, 0.0))
         return self.penalty * left, self._shear_penalty * left
 
-    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
-        """Loss of secant stiffness, d."""
-        return 1 - k_n / self.penalty, 1 - k_t / self._shear_penalty
+    @property
+    def characteristic_secants(self) -> tuple[float, float]:
+        """K and K_t: damage is d."""
+        return self.penalty, self._shear_penalty
 
     @property
     def _shear_penalty(self) -> float:

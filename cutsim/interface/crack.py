@@ -13,7 +13,7 @@ import ufl
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
-from cutsim.base.checks import positive, require, require_number
+from cutsim.base.checks import positive, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
@@ -34,7 +34,7 @@ from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.slip import check_friction
 
 #: Fields of a crack for output.
-FIELDS = ("damage", "opening", "sliding", "pressure", "dissipated")
+FIELDS = ("damage", "strength_loss", "spent", "opening", "sliding", "pressure", "dissipated")
 # pressure over that of faces which look at each other that counts as none
 _ROUNDING = 1e-9
 
@@ -204,7 +204,7 @@ class Crack(Term):
         doubt_penetration(self.state.verdict, self.name, self.penetration(), blend)
 
     def record(self) -> dict[str, tuple[float, str]]:
-        """Broken area ∫ D dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
+        """Broken area ∫ max(D_n, D_t) dΓ₀, largest opening, penetration over the normal mesh size. Collective."""
         columns = {
             f"{self.name}_opening": (self.points.maximum(self.history.trial["opening"]), "length"),
             f"{self.name}_penetration": (self.penetration(), "one"),
@@ -218,16 +218,13 @@ class Crack(Term):
         """Trial values at the integration points, shape (local crack facets, points).
 
         Args:
-            name: "damage", "opening", "sliding", "pressure", "stored" or "dissipated".
+            name: "damage" (4.26, 4.27), "strength_loss", "spent" (the larger of both modes, see
+                `cutsim.interface.damage`), "opening", "sliding", "pressure", "stored" or "dissipated".
 
         Raises:
             ValueError: The name is unknown.
         """
-        if name == "dissipated":
-            return self.history.dissipated()
-        trial = self.history.trial
-        require("name", name, name in trial, f"one of {(*trial, 'dissipated')}")
-        return trial[name]
+        return self.history.point_values(name)
 
     def dissipation(self) -> Values:
         """Fracture dissipation of the trial step at the integration points [energy per reference area]."""

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cutsim.base.checks import require
 from cutsim.base.memory import Memory
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.interface.cohesive import CohesiveLaw
+from cutsim.interface.damage import spent, strength_loss
 from cutsim.interface.dissipation import Way, losses
 
 
@@ -29,6 +31,8 @@ GAUSS = PathRule(*(tuple(0.5 * (a + b)) for a, b in zip(np.polynomial.legendre.l
 #: The ends, as for the work of the supports: for points that meet or lose their partner within a step.
 TRAPEZOID = PathRule((0.0, 1.0), (0.5, 0.5))
 
+# how far a bond is broken in both modes, from its smallest secants, besides its damage
+_MEASURES = {"strength_loss": strength_loss, "spent": spent}
 _COLUMNS = ("contact_power", "stored", "damage", "opening", "sliding", "pressure")
 
 #: Values at the points for the fraction s of the step's displacement increment: "secants" (a vector), "jump" (opening
@@ -96,6 +100,21 @@ class InterfaceHistory:
         """Values at the end of the trial step, by name."""
         return self._known.trial.values
 
+    def point_values(self, name: str) -> Values:
+        """Trial values at the points by name: those of `Along`, "strength_loss", "spent" and "dissipated".
+
+        Raises:
+            ValueError: The name is unknown.
+        """
+        if name == "dissipated":
+            return self._known.trial.lost
+        if name in _MEASURES:
+            none = np.ones_like(self._points.weights)
+            return none if self._law is None else _MEASURES[name](self._law, self._known.trial.secants).max(axis=-1)
+        names = (*self.trial, *_MEASURES, "dissipated")
+        require("name", name, name in self.trial, f"one of {names}")
+        return self.trial[name]
+
     def evaluate(self, along: Along) -> None:
         """Trial values, losses and the work of contact over the step. Collective."""
         at = {s: along(s) for s in sorted({0.0, 1.0, *self._rule.places})}
@@ -136,10 +155,6 @@ class InterfaceHistory:
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
         return self._points.maximum(self.trial["damage"] - self._known.committed.values["damage"])
-
-    def dissipated(self) -> Values:
-        """Fracture dissipation so far at the points [energy per reference area]."""
-        return self._known.trial.lost
 
     def dissipation(self) -> Values:
         """Fracture dissipation of the trial step at the points [energy per reference area]."""

@@ -8,6 +8,7 @@ from cutsim.base.functions import if_less
 from cutsim.base.kinematics import Expr, safe_norm
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.damage import damage
 
 # relative distance above its memory at which a secant still counts as loading
 _AT_HISTORY = 1e-9
@@ -27,7 +28,7 @@ class InterfaceResponse:
         penetration: Penetration that the pressure belongs to, with the part λ_N/ε_N that a multiplier makes up for;
             negative while open [length].
         pressure: Contact pressure ≥ 0 [stress].
-        damage: Damage in opening and sliding [–]; 1 without a law.
+        damage: Damage in opening and sliding (4.26, 4.27) [–]; 1 without a law.
     """
 
     sliding: Expr
@@ -70,7 +71,7 @@ def respond(
     sliding = safe_norm(slide, _REST * law.opening)
     envelope = law.secants(opening, sliding)
     k_n, k_t = (_smaller(k, memory[i]) for i, k in enumerate(envelope))
-    return InterfaceResponse(sliding, (k_n, k_t), k_n * opening, k_t * slide, depth, pressure, law.damage(k_n, k_t))
+    return InterfaceResponse(sliding, (k_n, k_t), k_n * opening, k_t * slide, depth, pressure, damage(law, k_n, k_t))
 
 
 def _smaller(secant: Expr, memory: Expr) -> Expr:

@@ -74,13 +74,11 @@ class ParkPaulinoRoesler(ByToughness):
         k_t = _secant(y, self.beta, self.shear_peak) / tangential**2 * along
         return k_n, k_t
 
-    def damage(self, k_n: Expr, k_t: Expr) -> tuple[Expr, Expr]:
-        """Loss of secant stiffness after the peak of each mode (thesis 4.26, 4.27)."""
+    @property
+    def characteristic_secants(self) -> tuple[float, float]:
+        """Strength over jump at the peak of each mode."""
         normal, tangential = self.final
-        return (
-            positive_part(1 - k_n * self.peak * normal / self.strength),
-            positive_part(1 - k_t * self.shear_peak * tangential / self.shear_strength),
-        )
+        return self.strength / (self.peak * normal), self.shear_strength / (self.shear_peak * tangential)
 
 
 def _exponent(shape: Expr, peak: Expr) -> Expr:

@@ -145,7 +145,7 @@ def crack_front(
         crack: The crack.
         axis: The coordinate.
         name: As for `Crack.point_values`.
-        level: Level; by default the front is where the damage is one half.
+        level: Level; by default the front is where the damage (4.26, 4.27) is one half.
         backwards: Whether the crack grows against the coordinate.
     """
     places, values = crack_profile(crack, name, axis)

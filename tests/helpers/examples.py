@@ -17,7 +17,7 @@ from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, Exponent
 from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Plane
-from helpers.laws import BILINEAR, EXPONENTIAL, NU, PPR, PROPORTIONAL, TRAPEZOIDAL, E
+from helpers.laws import BILINEAR, EXPONENTIAL, NU, POLYNOMIAL, PPR, PROPORTIONAL, TRAPEZOIDAL, E
 
 # -- cohesive laws ----------------------------------------------------------------------------------------------------
 
@@ -50,6 +50,7 @@ LAWS = {
     "bilinear": Bond(BILINEAR, (0.05, 0.02)),
     "proportional": Bond(PROPORTIONAL, (0.05, 0.02)),
     "ppr": Bond(PPR),
+    "polynomial": Bond(POLYNOMIAL),
     "trapezoidal": Bond(TRAPEZOIDAL, (0.16, 0.16)),
 }
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from cutsim.base.checks import positive, require_number
 from cutsim.base.functions import if_less, larger, positive_part, sqrt
 from cutsim.interface.cohesive import Bilinear, Exponential
+from cutsim.interface.polynomial import Polynomial
 from cutsim.interface.ppr import ParkPaulinoRoesler
 from cutsim.materials.elastic import LinearElastic
 
@@ -19,6 +20,7 @@ PROPORTIONAL = Bilinear.proportional(
 PPR = ParkPaulinoRoesler(
     strength=2.0, toughness=0.2, shear_strength=3.0, shear_toughness=0.5, alpha=3.0, beta=2.2, peak=0.15, shear_peak=0.2
 )
+POLYNOMIAL = Polynomial(strength=2.0, toughness=0.2, shear_strength=3.0, shear_toughness=0.5)
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,9 @@ class Trapezoidal:
         k = if_less(jump, self.plateau, held, falling)
         return k, k
 
-    def damage(self, k_n, k_t):
-        whole = self.strength / self.rise
-        return 1 - k_n / whole, 1 - k_t / whole
+    @property
+    def characteristic_secants(self):
+        return self.strength / self.rise, self.strength / self.rise
 
 
 TRAPEZOIDAL = Trapezoidal()
