@@ -43,6 +43,7 @@ from .interface.friction import FrictionLaw as FrictionLaw
 from .interface.friction import SmoothCoulomb as SmoothCoulomb
 from .interface.polynomial import Polynomial as Polynomial
 from .interface.ppr import ParkPaulinoRoesler as ParkPaulinoRoesler
+from .interface.viscous import ViscousBond as ViscousBond
 from .materials.anisotropic import FungOrthotropic as FungOrthotropic
 from .materials.anisotropic import TransverselyIsotropic as TransverselyIsotropic
 from .materials.directions import piecewise_direction as piecewise_direction

@@ -114,7 +114,7 @@ STATES = {
 @pytest.mark.parametrize("case", STATES)
 def test_friction_on_a_crack(case, gdim, normal):
     friction, law, jump = STATES[case]
-    sliding, opening, past = {**JUMPS, "breaking under compression": (1.7, -0.3, 1.0)}[jump]
+    sliding, opening, past = {**JUMPS, "breaking under compression": (2.6, -0.3, 1.0)}[jump]
     b = make_blocks(gdim)
     b.state.begin(0.7)
     crack = b.crack(law, normal=normal, contact=PenaltyContact(30.0))

@@ -28,6 +28,7 @@ from cutsim.base.terms import (
     Objecting,
     Observer,
     RateDependent,
+    Regularised,
     Term,
     offering,
     with_companions,
@@ -160,6 +161,8 @@ class Mechanics(Balance[Term, Support]):
 
         Constants move. The displacement stays, or with inertia goes on at the present velocity.
         """
+        # at rest before the step, or at a corner
+        self.state.jerks = not self._moved.committed or self.state.time_old in self.corners
         super().begin()
         self.problem.known[:] = self.motion.known(self._residual.committed)
 
@@ -197,7 +200,7 @@ class Mechanics(Balance[Term, Support]):
         rates = [forces for t in offering(self.terms, RateDependent) if (forces := t.rate_forces()) is not None]
         rate_forces = np.sum([np.zeros_like(residual), *rates], axis=0)
         mean = 0.5 * (residual + old)
-        if self._jerks():  # what follows the velocity has its value at the end of the step from its beginning on
+        if self.state.jerks:  # what follows the velocity has its value at the end of the step from its beginning on
             mean += 0.5 * (rate_forces - self._rate_forces.committed)
         work = global_dot(self.state.mesh.comm, supported(mean), self.state.increment)
         work += sum((t.external_work() for t in offering(self.terms, Loading)), start=0.0)
@@ -206,10 +209,6 @@ class Mechanics(Balance[Term, Support]):
 
     def _energies(self) -> list[dict[str, float]]:
         return [t.energies() for t in offering(self.terms, Energetic)]
-
-    def _jerks(self) -> bool:
-        """Whether prescribed velocities may jump at the start of the step: at rest before it, or at a corner."""
-        return not self._moved.committed or self.state.time_old in self.corners
 
     @property
     def audit(self) -> EnergyAudit:
@@ -238,7 +237,7 @@ class Mechanics(Balance[Term, Support]):
             words = f"{audit.worst_closure:.1%} of the energy is missing in the audit: smaller steps are needed"
             verdict.suppose("closure", words, aloud=audit.scale < _BEGUN * self.audit.scale)
         lost = entries["fracture"] + entries["friction"]
-        viscous = sum((b.viscous_work for b in offering(self.terms, Body)), start=0.0)
+        viscous = sum((t.viscous_work for t in offering(self.terms, Regularised)), start=0.0)
         verdict.withdraw("viscosity")
         if lost > 0 and viscous > VISCOUS * (lost + viscous):
             # before anything breaks it is all of it: what counts is how much it is in the end

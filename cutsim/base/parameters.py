@@ -87,7 +87,7 @@ def _changed(item: Any, change: Callable[[str, float], Any], name: str, build: C
     return change(name, item) if number else item
 
 
-def _unchecked(law: Any, **parts: Any) -> Any:
+def _unchecked(law: Any, /, **parts: Any) -> Any:
     changed = copy(law)
     for name, part in parts.items():
         # the dataclasses are frozen, and their checks are for numbers

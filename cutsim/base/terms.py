@@ -22,7 +22,7 @@ from cutsim.base.kinematics import Expr
 #: Entries of the energy audit; the external work equals their sum (docs/theory.md §6).
 ENTRIES = (
     "strain", "kinetic", "thermoelastic", "cohesive_stored", "contact",  # stored
-    "fracture", "friction", "viscous", "numerical",  # lost
+    "fracture", "friction", "viscous", "cohesive_viscous", "numerical",  # lost
 )  # fmt: skip
 
 #: Columns of a history row: name → (value, kind of quantity).
@@ -234,9 +234,14 @@ class Body(Protocol):
     cells: NDArray[np.int32] | None
     density: float | None
 
+
+@runtime_checkable
+class Regularised(Protocol):
+    """A term with a viscosity that may only help the solver."""
+
     @property
     def viscous_work(self) -> float:
-        """Work of a viscosity that may only help the solver, up to the trial state [energy]."""
+        """Work of this viscosity up to the trial state [energy]."""
 
 
 @runtime_checkable

@@ -64,6 +64,7 @@ class State:
         u: Trial displacement [length].
         u_old: Committed displacement, at the start of the step.
         dt: Step size as a form constant.
+        jerks: Whether prescribed velocities may jump at the start of the step; `cutsim.analysis.mechanics` says so.
         memory: What displacement, terms, solvers and the loop over steps remember.
         pace: What the loop over steps knows of the next one; it is set by `cutsim.analysis.stepping.run`.
         measures: Integration measures that the terms share.
@@ -86,6 +87,7 @@ class State:
         self.u = fem.Function(V, name="u")
         self.u_old = fem.Function(V, name="u_old")
         self.dt = fem.Constant(V.mesh, default_scalar_type(1.0))
+        self.jerks = False
         self.measures = Measures(V.mesh, axisymmetric=axisymmetric)
         self.memory = Memory()
         self.verdict = Verdict(self.memory)

@@ -28,10 +28,12 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_faces import CrackFaces
 from cutsim.interface.crack_friction import CrackFriction
+from cutsim.interface.crack_viscosity import CrackViscosity
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.slip import check_friction
+from cutsim.interface.viscous import ViscousBond
 
 #: Fields of a crack for output.
 FIELDS = ("damage", "strength_loss", "spent", "opening", "sliding", "pressure", "dissipated")
@@ -63,6 +65,7 @@ class Crack(Term):
         history: What they remember.
         faces: Kinematics and tractions of the faces at a displacement.
         friction: Friction of the faces, or None.
+        viscosity: Viscosity of the bond, or None.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
         normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
 
@@ -109,6 +112,7 @@ class Crack(Term):
         options = {"current": normal == "current", "augmented": allowed_penetration is not None}
         self.faces = CrackFaces(state, self.points, self.history, law, pressing, **options)
         self.friction = CrackFriction(self, friction) if friction else None
+        self.viscosity = CrackViscosity(self, law) if isinstance(law, ViscousBond) else None
 
     @property
     def size(self) -> float:
@@ -117,8 +121,8 @@ class Crack(Term):
 
     @property
     def companions(self) -> Sequence[Term]:
-        """The friction of the faces."""
-        return () if self.friction is None else (self.friction,)
+        """Friction of the faces and viscosity of the bond."""
+        return [part for part in (self.friction, self.viscosity) if part is not None]
 
     # -- virtual work ---------------------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.modified_contact import respond
 from cutsim.interface.slip import Rubbing, SlipHistory
+from cutsim.interface.viscous import ViscousBond, ViscousHistory
 from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.pairing import Array
 
@@ -51,6 +52,7 @@ class PairLaw:
 
     Attributes:
         slip: What the points remember of friction, or None.
+        viscous: What they remember of the viscosity of the bond, or None.
     """
 
     def __init__(
@@ -84,6 +86,10 @@ class PairLaw:
             self.slip = SlipHistory(state, name, points, laws.friction, rubbing, tolerance=laws.allowed_slip)
             shear = [s + share * t for s, t in zip(shear, self.slip.traction, strict=True)]
         traction = ufl.as_vector([r.tension - r.pressure, *shear])
+        self.viscous: ViscousHistory | None = None
+        if isinstance(laws.cohesive, ViscousBond):
+            self.viscous = ViscousHistory(state, name, points, laws.cohesive, [jump[0], *slide], r.damage)
+            traction += self.viscous.traction
         stiffness = ufl.diff(traction, jump)
         flat = [stiffness[i, j] for i in range(self._dim) for j in range(self._dim)]
         self._values = points.evaluator(columns)

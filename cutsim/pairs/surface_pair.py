@@ -186,6 +186,16 @@ class SurfacePair(Term):
                 total[entry] = total.get(entry, 0.0) + value
         return total
 
+    @property
+    def viscous_work(self) -> float:
+        """Work of the viscosity of the bond up to the trial state [energy]."""
+        return self.energies().get("cohesive_viscous", 0.0)
+
+    def rate_forces(self) -> NDArray[np.float64] | None:
+        """Forces of the viscosity of the bond, owned entries. Collective."""
+        forces = [f for p in self.passes if (f := p.rate_forces()) is not None]
+        return np.sum(forces, axis=0) if forces else None
+
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
         return max(p.history.damage_increment() for p in self.passes)

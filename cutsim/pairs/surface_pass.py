@@ -5,7 +5,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from cutsim.base.assembly import add_blocks
+from cutsim.base.assembly import add_blocks, owned_vector
 from cutsim.base.checks import require
 from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints, Values
@@ -55,6 +55,7 @@ class SurfacePass:
         weights: Weights of the points, flattened, times the factor; zero where another rank adds them.
         history: What they remember of opening and damage.
         slip: What they remember of friction, or None.
+        viscous: What they remember of the viscosity of the bond, or None.
     """
 
     def __init__(
@@ -74,7 +75,7 @@ class SurfacePass:
         rule = GAUSS if kinematics.small_sliding else TRAPEZOID
         self.history = InterfaceHistory(state.memory, name, points, laws.cohesive, rule, ("held",))
         self._law = PairLaw(state, name, points, laws, self.history, kinematics.pairs(self._start()))
-        self.slip = self._law.slip
+        self.slip, self.viscous = self._law.slip, self._law.viscous
         self._seen: Array | None = None
         self._force = state.memory.value(f"{name}: force", np.zeros(self._dim))
 
@@ -115,8 +116,9 @@ class SurfacePass:
         """Trial history, and the force on the slave, of the converged trial displacement."""
         ends = self._start(), self.kinematics.nodes(self._state.u.x.array)
         self.history.evaluate(lambda s: self._along(ends, s))
-        if self.slip is not None:
-            self.slip.evaluate()
+        for part in (self.slip, self.viscous):
+            if part is not None:
+                part.evaluate()
         self._force.trial = self._state.mesh.comm.allreduce(self.point_forces().sum(axis=0))
         self.kinematics.note(self.partners())
 
@@ -157,6 +159,8 @@ class SurfacePass:
         total |= {"contact": held, "numerical": total["contact"] - held}
         for entry, value in (self.slip.energies() if self.slip is not None else {}).items():
             total[entry] += value
+        if self.viscous is not None:
+            total["cohesive_viscous"] = self.viscous.dissipated()
         return {entry: self.weight * value for entry, value in total.items()}
 
     # -- forces ---------------------------------------------------------------------------------------------------
@@ -171,8 +175,26 @@ class SurfacePass:
 
     def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
         """Add nodal forces, as `cutsim.base.terms.Assembler.add_forces`."""
+        self.partners()
+        self._add(b, self._tractions(linearised=along is not None), along)
+
+    def rate_forces(self) -> Array | None:
+        """Nodal forces of the viscosity of the bond, owned entries; None without it."""
+        if self.viscous is None:
+            return None
+        self.partners()
+        values = self.viscous.values().reshape(-1, self._dim)
+        dofmap = self._state.V.dofmap
+        b = owned_vector(dofmap.index_map, dofmap.index_map_bs)
+        self._add(b, Tractions(values, np.zeros((*values.shape, self._dim)), self.weights), None)
+        b.assemble()
+        forces = b.array.copy()
+        b.destroy()
+        return forces
+
+    def _add(self, b: PETSc.Vec, tractions: Tractions, along: Array | None) -> None:
+        """Add the nodal forces of tractions."""
         kinematics, pairs = self.kinematics, self.partners()
-        tractions = self._tractions(linearised=along is not None)
         rows = nodal_forces.active(kinematics, pairs, tractions)
         forces = nodal_forces.forces(kinematics, pairs, tractions, rows)
         if along is not None:

@@ -30,6 +30,7 @@ ENERGIES = {
     "energy_fracture": ("fracture", "#D55E00"),
     "energy_friction": ("friction", "#E69F00"),
     "energy_viscous": ("viscous", "#999999"),
+    "energy_cohesive_viscous": ("viscosity of the bond", "#66a61e"),
     "energy_numerical": ("numerical", "#000000"),
 }
 

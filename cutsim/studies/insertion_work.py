@@ -18,6 +18,8 @@ from cutsim.tools.tool_parts import PARTS
 #: Columns of a run by name, as `cutsim.results.output.read_history` gives them.
 HistoryOutput = Mapping[str, Array]
 
+_VISCOUS = ("viscous", "cohesive_viscous")
+
 
 def audited_toughness(history: HistoryOutput, start: float, end: float, symmetry_factor: float) -> float:
     """Toughness as the rest of the energy audit, (∫F ds − ΔE − losses)/ΔA: a check of the audit [force/length].
@@ -35,7 +37,7 @@ def audited_toughness(history: HistoryOutput, start: float, end: float, symmetry
     Raises:
         ValueError: The cut does not grow between the two depths.
     """
-    held = ("strain", "contact", "friction", "viscous")
+    held = ("strain", "contact", "friction", *_VISCOUS)
     spent = symmetry_factor * (history["work_external"] - sum(history[f"energy_{name}"] for name in held))
     pushed = _first_push(history["depth"])
 
@@ -154,7 +156,7 @@ def force_parts(history: HistoryOutput, symmetry_factor: float, window: float) -
         "deformation": energy("strain", "contact"),
         "cutting": energy("cohesive_stored", "fracture"),
         **{f"{part} friction": rate(history[f"{part}_friction_work"][pushed]) for part in PARTS},
-        "viscosity": energy("viscous"),
+        "viscosity": energy(*_VISCOUS),
     }
 
 
@@ -214,7 +216,7 @@ class TwoInsertions:
         time = history["time"]
         require("time", float(time[-1]), time[-1] >= ends[-1] * (1 - 1e-9), f">= {ends[-1]}, when the second push ends")
         time = np.append(0.0, time)
-        lost = history["energy_friction"] + history["energy_viscous"]
+        lost = sum(history[f"energy_{name}"] for name in ("friction", *_VISCOUS))
         works, losses = (
             whole * np.diff(np.interp(ends, time, np.append(0.0, column)))[::2]
             for column in (history["work_external"], lost)
