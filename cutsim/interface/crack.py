@@ -13,7 +13,7 @@ import ufl
 from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
-from cutsim.base.checks import positive, require_number
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked

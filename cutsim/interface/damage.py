@@ -4,8 +4,6 @@ All follow from the smallest secants so far, never fall, and go from 0 to 1.  Of
 suffered that was opened, or slid, by itself until its secant was the present one.
 """
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
@@ -94,7 +92,6 @@ def _jumps(law: CohesiveLaw, secants: Array) -> NDArray[np.float64]:
     return found
 
 
-@lru_cache
 def _peak(law: CohesiveLaw, mode: int) -> tuple[float, float]:
     """Jump and traction at the strength of a mode by itself."""
     scale = _scale(law, mode)

@@ -223,23 +223,28 @@ class SurfacePair(Term):
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Force on the slave, pressed area, penetration, areas that stick and slip, broken area. Collective."""
-        name, kind = self.name, self.state.facet_measure
-        slaves = [p for p, sign in zip(self.passes, self.signs, strict=True) if sign > 0]
-        # of a surface that meets itself two sides of what is pressed are slaves
-        share = 0.5 if self.folding else 1.0
-        columns = {}
-        if not self.folding:
-            columns = {f"{name}_force_{a}": (float(f), "force") for a, f in zip(_AXES, self.force(), strict=False)}
-        pressed = sum(p.points.integral((p.history.trial["pressure"] > 0).astype(float)) for p in slaves)
-        columns[f"{name}_pressed"] = (share * pressed, kind)
-        columns[f"{name}_penetration"] = (self.penetration(), "one")
-        areas = [p.slip.areas() for p in slaves if p.slip is not None]
-        for what, parts in zip(("sticking", "slipping"), zip(*areas, strict=True), strict=False):
-            columns[f"{name}_{what}"] = (share * sum(parts), kind)
-        if self.law is not None:
-            broken = sum(p.points.integral(p.history.trial["damage"]) for p in slaves)
-            columns[f"{name}_broken"] = (broken, kind)
-        return columns
+        return _columns(self)
+
+
+def _columns(pair: SurfacePair) -> dict[str, tuple[float, str]]:
+    """Columns of the history of a pair. Collective."""
+    name, kind = pair.name, pair.state.facet_measure
+    slaves = [p for p, sign in zip(pair.passes, pair.signs, strict=True) if sign > 0]
+    # of a surface that meets itself two sides of what is pressed are slaves
+    share = 0.5 if pair.folding else 1.0
+    columns = {}
+    if not pair.folding:
+        columns = {f"{name}_force_{a}": (float(f), "force") for a, f in zip(_AXES, pair.force(), strict=False)}
+    pressed = sum(p.points.integral((p.history.trial["pressure"] > 0).astype(float)) for p in slaves)
+    columns[f"{name}_pressed"] = (share * pressed, kind)
+    columns[f"{name}_penetration"] = (pair.penetration(), "one")
+    areas = [p.slip.areas() for p in slaves if p.slip is not None]
+    for what, parts in zip(("sticking", "slipping"), zip(*areas, strict=True), strict=False):
+        columns[f"{name}_{what}"] = (share * sum(parts), kind)
+    if pair.law is not None:
+        broken = sum(p.points.integral(p.history.trial["damage"]) for p in slaves)
+        columns[f"{name}_broken"] = (broken, kind)
+    return columns
 
 
 def _faces(state: State, given: Parts, name: str) -> list[Face]:
