@@ -16,7 +16,7 @@ from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.pairs.surface_pair import SurfacePair
 from helpers.boxes import stack, two
 from helpers.fields import rotation, wavy
-from helpers.laws import EXPONENTIAL, E
+from helpers.laws import E
 from helpers.runs import LINE_SEARCHES, history
 from helpers.tangents import STEPS, Assembled, slopes
 
@@ -54,35 +54,6 @@ def test_tangent(gdim, simplices, degree, case, fixed):
     assert slopes(STEPS, remainders).min() > 1.95, remainders
     np.testing.assert_allclose(problem.forces(u, w), f + slope, atol=1e-12 * np.linalg.norm(slope))
     assert np.abs(f.reshape(-1, gdim).sum(axis=0)).max() < 1e-13 * np.abs(f).sum()
-
-
-# mean jump of a bond over its characteristic openings of 0.1 and 0.2: opened, slid, both, slid under pressure
-JUMPS = {"opening": (0.15, 0.0), "sliding": (0.02, 0.25), "both": (0.08, 0.15), "pressed": (-0.03, 0.2)}
-
-
-@pytest.mark.parametrize("past", [1.0, 1.6], ids=["loading", "unloading"])
-@pytest.mark.parametrize("jump", JUMPS)
-@pytest.mark.parametrize("gdim", [2, 3])
-def test_tangent_of_a_bond(gdim, jump, past):
-    """A pair with a cohesive law, with friction on what is broken, on its envelope and below it."""
-    b = two(gdim, overhang=0.5, comm=MPI.COMM_SELF)
-    pair = b.pair(law=EXPONENTIAL, small_sliding=True, friction=Coulomb(50.0, 7.0), contact=PenaltyContact(20.0))
-    opening, sliding = JUMPS[jump]
-    shift = np.zeros(3)
-    shift[0], shift[gdim - 1] = sliding, opening
-    if past > 1:
-        b.move(lambda x: past * shift[:, None] + 0 * x, 1)
-        pair.evaluate()
-        b.state.commit()
-    pair.begin()
-    b.move(lambda x: shift[:, None] + 0 * x, 1)
-    u, w = b.state.u.x.array + wavy(b.state.V, 1, 0.004), wavy(b.state.V, 3, 0.01)
-    problem = Assembled(pair, b.state)
-    f, slope = problem.forces(u), problem.matrix(u) @ w
-    remainders = np.array([np.linalg.norm(problem.forces(u + h * w) - f - h * slope) for h in STEPS])
-    assert remainders[0] > 1e-9 * np.linalg.norm(slope)
-    assert slopes(STEPS, remainders).min() > 1.95, remainders
-    np.testing.assert_allclose(problem.forces(u, w), f + slope, atol=1e-12 * np.linalg.norm(slope))
 
 
 @pytest.mark.parametrize("offset", [-2e-3, 2e-3])
@@ -301,40 +272,6 @@ def test_rotation_of_a_stuck_interface(gdim, fixed):
     assert pair.energies()["friction"] == 0
 
 
-# -- bond -------------------------------------------------------------------------------------------------------------
-
-
-def envelope(opening, sliding):
-    """Normal and shear traction of the exponential law under growing openings (van den Bosch et al.)."""
-    x, y = opening / EXPONENTIAL.opening, sliding / EXPONENTIAL.shear_opening
-    normal, shear = EXPONENTIAL.toughness / 0.1, EXPONENTIAL.shear_toughness / 0.2
-    return normal * x * np.exp(-x - y**2), 2 * shear * y * (1 + x) * np.exp(-x - y**2)
-
-
-@pytest.mark.parametrize("pull", [(1.0, 0.0), (0.0, 1.0), (0.5, 1.0)], ids=["opened", "slid", "both"])
-@pytest.mark.parametrize("gdim", [2, 3])
-def test_bond_between_meshes_that_do_not_match(gdim, pull):
-    """Pulled, sheared, and both, as a whole: force and work of separation of the law, whatever the meshes."""
-    b = two(gdim)
-    pair, up = b.pair(law=EXPONENTIAL, small_sliding=True), gdim - 1
-    way = np.append(pull[1] * np.array([[1.0], [0.6, 0.8]][gdim - 2]), pull[0])
-    rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
-    moved = [
-        Support(b.state, b.cells(1), i, lambda t, part=part: part * t, dim=gdim, name=f"top_{'xyz'[i]}")
-        for i, part in enumerate(way)
-    ]
-    mechanics = Mechanics(b.state, [Solid(b.state, LinearElastic(E, 0.3)), pair], rigid + moved)
-    rows = history(mechanics, 1.5, StepControl(first=0.15, largest=0.15))
-    normal, shear = envelope(pull[0] * rows["time"], pull[1] * rows["time"])
-    force = np.array([rows[f"top_{'xyz'[i]}_force"] for i in range(gdim)])
-    np.testing.assert_allclose(force[up], normal, rtol=1e-8, atol=1e-12)
-    np.testing.assert_allclose(force[:up], np.outer(way[:up], shear) / max(pull[1], 1e-300), rtol=1e-8, atol=1e-12)
-    s = np.linspace(0.0, 1.5, 20_001)
-    work = np.trapezoid(np.dot(pull, envelope(pull[0] * s, pull[1] * s)), s)
-    np.testing.assert_allclose(rows["energy_fracture"][-1], work, rtol=5e-3)
-    np.testing.assert_allclose(rows["pair_broken"][-1], 1.0, rtol=5e-3)
-
-
 # -- state ------------------------------------------------------------------------------------------------------------
 
 
@@ -383,7 +320,6 @@ BAD = {
     "search": {"search": -1.0},
     "allowed_penetration": {"allowed_penetration": 0.0},
     "allowed_slip": {"allowed_slip": -1.0},
-    "small_sliding": {"law": EXPONENTIAL},
 }
 
 

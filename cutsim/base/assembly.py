@@ -48,18 +48,20 @@ def box(comm: MPI.Comm, points: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def add_blocks(A: PETSc.Mat, dofs: NDArray[np.int64], blocks: Array) -> None:
+def add_blocks(A: PETSc.Mat, dofs: NDArray[np.int64], blocks: Array, columns: NDArray[np.int64] | None = None) -> None:
     """Add dense blocks to a matrix, on rows of any rank. The caller assembles it.
 
     Args:
         A: The matrix.
-        dofs: Global dofs of each block, shape (blocks, n).
-        blocks: Shape (blocks, n, n).
+        dofs: Global dofs of the rows of each block, shape (blocks, n).
+        blocks: Shape (blocks, n, m).
+        columns: Global dofs of the columns, shape (blocks, m); None for those of the rows.
     """
-    n = dofs.shape[1]
-    rows, columns = dofs.astype(PETSc.IntType).ravel(), np.repeat(dofs, n, axis=0).astype(PETSc.IntType)
+    columns = dofs if columns is None else columns
+    n, m = dofs.shape[1], columns.shape[1]
+    rows, columns = dofs.astype(PETSc.IntType).ravel(), np.repeat(columns, n, axis=0).astype(PETSc.IntType)
     # every row of a block is a row of a matrix in compressed rows, in which rows may repeat
-    starts = np.arange(0, columns.size + 1, n, dtype=PETSc.IntType)
+    starts = np.arange(0, columns.size + 1, m, dtype=PETSc.IntType)
     A.setValuesIJV(starts, columns.ravel(), blocks.ravel(), addv=PETSc.InsertMode.ADD, rowmap=rows)
 
 

@@ -124,7 +124,7 @@ class HeatPass:
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.base.terms.Assembler.add_pattern`."""
-        facets = self.contact.kinematics.partners.facets
+        facets = self.contact.kinematics.facets
         near = [f[self._slave.owned[facets[0]]] for f in facets]
         own = self._slave.global_nodes
         facing = np.hstack([own[near[0]], self._master.global_nodes[near[1]]])

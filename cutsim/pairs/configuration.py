@@ -2,7 +2,8 @@
 
 The jump at a slave point has components in a frame (ν, a₁, a₂) that turns with the slave surface: ν is its outward
 normal, a₁ follows the first reference direction of the facet.  Everything depends on the nodes through four vectors
-only, the *primitives*: the point, the tangents of its facet, and the place on the master facet.
+only, the *primitives*: the point, the tangents of its facet, and the place on the master facet.  The frames of a bond
+follow the surface half way between both: there the tangents are those of this surface.
 """
 
 from dataclasses import dataclass
@@ -36,7 +37,13 @@ class Points:
         dim = nodes.shape[-1]
         x = np.einsum("qa,fai->fqi", tables[0], nodes).reshape(-1, dim)
         tangents = np.einsum("qka,fai->fqki", tables[1], nodes).reshape(-1, dim - 1, dim)
-        outward = np.repeat(sides, len(tables[0]))[:, None] * normals(tangents)
+        return cls.framed(x, tangents, np.repeat(sides, len(tables[0])))
+
+    @classmethod
+    def framed(cls, x: Array, tangents: Array, sides: Array) -> Self:
+        """Points with frames along given tangents; the sides, one a point, tell which normal points outwards."""
+        dim = x.shape[-1]
+        outward = sides[:, None] * normals(tangents)
         nu = _unit(outward)
         first = np.stack([-nu[:, 1], nu[:, 0]], axis=-1) if dim == 2 else _unit(tangents[:, 0])
         rest = [] if dim == 2 else [np.cross(nu, first)]
@@ -66,38 +73,52 @@ class Points:
 
 
 @dataclass(frozen=True)
+class OnRay:
+    """What makes partners on the rays of the points move over the master.
+
+    Attributes:
+        derivatives: Derivatives of the shape functions at the partners, shape (hits, directions, nodes).
+        tangents: Current tangents of the master facets there, shape (hits, directions, dimension).
+        slide_rate: Derivative of the jump by the reference coordinates at fixed frame, shape (hits, dimension,
+            directions).
+    """
+
+    derivatives: Array
+    tangents: Array
+    slide_rate: Array
+
+
+@dataclass(frozen=True)
 class Pairs:
     """Slave points and their partners in a configuration.
 
     Attributes:
-        slave: The slave points.
+        slave: The slave points, with the frames of the jump.
         hits: Their partners.
         values: Shape functions of the master facets at the partners, shape (hits, nodes).
-        derivatives: Their derivatives, shape (hits, directions, nodes).
         jump: Opening and slide of every point, shape (points, dimension) [length].
-        slide_rate: Derivative of the jump by the reference coordinates at fixed frame, shape (hits, dimension,
-            directions); for pairs that do not move on, None.
         distance: From each point to its partner, x_m − x_s, shape (hits, dimension) [length].
-        tangents: Current tangents of the master facets at the partners, shape (hits, directions, dimension).
+        on_ray: How partners on rays move; None for material points of the master.
+        midway: Nodal factors of the master in the tangents of frames between both surfaces, shape (hits, directions,
+            nodes), those of the slave being halved; None if the frames are those of the slave.
     """
 
     slave: Points
     hits: Hits
     values: Array
-    derivatives: Array
     jump: Array
-    slide_rate: Array | None
     distance: Array
-    tangents: Array
+    on_ray: OnRay | None = None
+    midway: Array | None = None
 
-    def linearise(self, rows: Indices) -> tuple[Array, Array, Array]:
+    def linearise(self, rows: Indices) -> tuple[Array, Array, Array | None]:
         """Derivatives of some pairs with respect to the primitives.
 
         Args:
             rows: Pairs, by their place in `hits`.
 
         Returns:
-            Derivatives of the jump, of the frame and of the reference coordinates; the last two indices are
+            Derivatives of the jump, of the frame and, on rays, of the reference coordinates; the last two indices are
             primitive and component.
         """
         points = self.hits.points[rows]
@@ -107,18 +128,17 @@ class Pairs:
         d_frame[:, :, :, 1:dim] = self.slave.turning(points)
         apart = np.zeros((n, dim, dim + 1, dim))
         apart[:, :, dim], apart[:, :, 0] = np.eye(dim), -np.eye(dim)
-        d_xi = np.zeros((n, dim - 1, dim + 1, dim))
-        if self.slide_rate is None:
+        if self.on_ray is None:
             d_jump = np.einsum("nai,nipj->napj", frames, apart)
             d_jump += np.einsum("ni,naipj->napj", self.distance[rows], d_frame)
-            return d_jump, d_frame, d_xi
+            return d_jump, d_frame, None
         # the partner stays on the ray: across it d(x_m + t_k ξ_k − x_s − g ν) vanishes and gives dξ; along it this is
         # the change of the gap
-        tangents = self.tangents[rows]
+        tangents = self.on_ray.tangents[rows]
         missing = self.hits.gap[rows, None, None, None] * d_frame[:, 0] - apart
         lateral = inverse(np.einsum("nai,nki->nak", frames[:, 1:], tangents))
         d_xi = np.einsum("nka,nai,nipj->nkpj", lateral, frames[:, 1:], missing)
-        d_jump = np.einsum("nak,nkpj->napj", self.slide_rate[rows], d_xi)
+        d_jump = np.einsum("nak,nkpj->napj", self.on_ray.slide_rate[rows], d_xi)
         d_jump[:, 0] = np.einsum("ni,nipj->npj", frames[:, 0], np.einsum("nki,nkpj->nipj", tangents, d_xi) + apart)
         return d_jump, d_frame, d_xi
 

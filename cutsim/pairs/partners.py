@@ -5,7 +5,7 @@ import numpy as np
 
 from cutsim.base.memory import Memory
 from cutsim.fields.points import DEGREE
-from cutsim.pairs.configuration import Pairs, Points
+from cutsim.pairs.configuration import OnRay, Pairs, Points
 from cutsim.pairs.outer_surface import Master, SlaveSurface
 from cutsim.pairs.pairing import Array, Hits, Indices
 from cutsim.pairs.search import PartnerSearch
@@ -19,55 +19,29 @@ TOUCH = 1e-12
 class PairKinematics:
     """Slave points and their partners on a master surface. Every method is collective.
 
-    Sliding pairs: a point's partner is where the ray along ν meets the current master surface, and the opening is the
-    distance along the ray.  The slide grows by −a_α·(x_m − x_s) at the *start* of the step, between the point and the
-    material point that it meets now: it needs no facet-wise memory, and a rigid rotation adds nothing to it.
-
-    Fixed pairs: partners are those of the reference configuration, and the jump is x_m − x_s in the frame, less what it
-    is in the reference configuration.
-
     Args:
-        memory: Memory of the run.
-        name: Name of the slave surface.
         slave: The slave surface.
         master: The master surface.
-        small_sliding: Whether pairs are those of the reference configuration.
-        search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
-            come into it during a step, find theirs at any depth.
-        size: Mean size of the slave facets [length].
 
     Attributes:
         tables: Shape functions and derivatives at the points of a slave facet.
-        partners: Search for facets that are near each other, and for partners on them.
     """
 
-    def __init__(
-        self,
-        memory: Memory,
-        name: str,
-        slave: SlaveSurface,
-        master: Master,
-        *,
-        small_sliding: bool,
-        search: float,
-        size: float,
-    ) -> None:
-        self.slave, self.master, self.small_sliding, self._search = slave, master, small_sliding, search
+    def __init__(self, slave: SlaveSurface, master: Master) -> None:
+        self.slave, self.master = slave, master
         shape = slave.shape.element
         places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
         self.tables = slave.shape.values(places)
-        self._size = size
-        nodes = slave.reference, master.reference
-        points = self._points(nodes[0])
-        self._old, self._old_nodes = points, nodes
-        count = len(self.tables[0])
-        rest = np.zeros((len(points.x), points.x.shape[-1] - 1))
-        self._slid = memory.value(f"{name}: slide", rest, places=slave.places)
-        self.partners = PartnerSearch(memory, name, slave, master, points, count, search=search, size=size)
-        self._old_hits = self.partners.begin(points, nodes) if small_sliding else self.partners.dig_out()
-        self._offset = np.zeros_like(points.x)
-        if small_sliding:
-            self._offset = self.pairs(nodes).jump
+
+    @property
+    def facets(self) -> tuple[Indices, Indices]:
+        """Slave and master facets between which forces may act."""
+        raise NotImplementedError
+
+    @property
+    def version(self) -> int:
+        """Number that grows when these facets are others."""
+        return 0
 
     def nodes(self, u: Array, *, start: bool = False) -> tuple[Array, Array]:
         """Current nodes of slave and master facets, from a displacement of the local dofs.
@@ -77,6 +51,10 @@ class PairKinematics:
             start: Whether it is that at the start of the step.
         """
         return self.slave.reference + self.slave.gather(u), self.master.nodes(u, start=start)
+
+    def between(self, slave: Indices, master: Indices) -> Indices:
+        """Global nodes of some slave facets and of as many master facets, side by side."""
+        return np.hstack([self.slave.global_nodes[slave], self.master.global_nodes[master]])
 
     def interpolate(self, nodes: Array) -> Array:
         """Values at the points of a field on the nodes of the slave facets."""
@@ -89,9 +67,66 @@ class PairKinematics:
 
     def begin(self, nodes: tuple[Array, Array]) -> None:
         """Take a configuration for the start of a step."""
+
+    def note(self, pairs: Pairs) -> None:
+        """Take note of the pairs at the end of a step."""
+
+    def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
+        """Points and partners for nodes of slave and master facets."""
+        raise NotImplementedError
+
+    def _points(self, nodes: Array) -> Points:
+        return Points.on(nodes, self.slave.sides, self.tables)
+
+
+class CurrentPartners(PairKinematics):
+    """Partners of the current configuration, for contact, friction and heat. Every method is collective.
+
+    A point's partner is where the ray along ν meets the current master surface, and the opening is the distance along
+    the ray.  The slide grows by −a_α·(x_m − x_s) at the *start* of the step, between the point and the material point
+    that it meets now: it needs no facet-wise memory, and a rigid rotation adds nothing to it.
+
+    Args:
+        memory: Memory of the run.
+        name: Name of the slave surface.
+        slave: The slave surface.
+        master: The master surface.
+        search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
+            come into it during a step, find theirs at any depth.
+        size: Mean size of the slave facets [length].
+
+    Attributes:
+        partners: Search for facets that are near each other, and for partners on them.
+    """
+
+    def __init__(
+        self, memory: Memory, name: str, slave: SlaveSurface, master: Master, *, search: float, size: float
+    ) -> None:
+        super().__init__(slave, master)
+        self._search, self._size = search, size
+        nodes = slave.reference, master.reference
+        points = self._points(nodes[0])
+        self._old, self._old_nodes = points, nodes
+        rest = np.zeros((len(points.x), points.x.shape[-1] - 1))
+        self._slid = memory.value(f"{name}: slide", rest, places=slave.places)
+        count = len(self.tables[0])
+        self.partners = PartnerSearch(memory, name, slave, master, points, count, search=search, size=size)
+        self._old_hits = self.partners.dig_out()
+
+    @property
+    def facets(self) -> tuple[Indices, Indices]:
+        """Slave and master facets that are near each other."""
+        return self.partners.facets
+
+    @property
+    def version(self) -> int:
+        """Number that grows when other facets have come near each other."""
+        return self.partners.version
+
+    def begin(self, nodes: tuple[Array, Array]) -> None:
+        """Take a configuration for the start of a step."""
         self._old, self._old_nodes = self._points(nodes[0]), nodes
-        if not self.small_sliding:
-            self._old_hits = self.partners.begin(self._old, nodes)
+        self._old_hits = self.partners.begin(self._old, nodes)
 
     def note(self, pairs: Pairs) -> None:
         """Trial slide, and which points have a partner how deep, at the end of a step."""
@@ -102,25 +137,16 @@ class PairKinematics:
     def pairs(self, nodes: tuple[Array, Array]) -> Pairs:
         """Points and partners for nodes of slave and master facets."""
         points = self._points(nodes[0])
-        hits = self._old_hits if self.small_sliding else self.partners.hits(points, nodes)
+        hits = self.partners.hits(points, nodes)
         values, derivatives = self.master.shape.values(hits.xi)
         y = nodes[1][hits.facets]
         distance = np.einsum("nb,nbi->ni", values, y) - points.x[hits.points]
         tangents = np.einsum("nkb,nbi->nki", derivatives, y)
-        if self.small_sliding:
-            jump, rate = self._fixed_jump(points, hits, distance), None
-        else:
-            jump, rate = self._sliding_jump(hits, values, derivatives)
-            self._slide_of_lost(points, hits, nodes[1], jump)
-        return Pairs(points, hits, values, derivatives, jump, rate, distance, tangents)
+        jump, rate = self._jump(hits, values, derivatives)
+        self._slide_of_lost(points, hits, nodes[1], jump)
+        return Pairs(points, hits, values, jump, distance, OnRay(derivatives, tangents, rate))
 
-    def _fixed_jump(self, points: Points, hits: Hits, distance: Array) -> Array:
-        jump = np.zeros_like(points.x)
-        jump[:, 0] = self._search
-        jump[hits.points] = np.einsum("nai,ni->na", points.frames[hits.points], distance) - self._offset[hits.points]
-        return jump
-
-    def _sliding_jump(self, hits: Hits, values: Array, derivatives: Array) -> tuple[Array, Array]:
+    def _jump(self, hits: Hits, values: Array, derivatives: Array) -> tuple[Array, Array]:
         """The jump, and its rate with the place on the master facet."""
         # the point and the material point that it meets now, both where they were at the start of the step: a rigid
         # motion of the two bodies together within the step is no slide
@@ -145,6 +171,3 @@ class PairKinematics:
         for sign, at, y in ((1, points, master), (-1, self._old, self._old_nodes[1])):
             distance = np.einsum("nb,nbi->ni", values, y[facets]) - at.x[rows]
             jump[rows, 1:] += sign * np.einsum("nai,ni->na", at.frames[rows, 1:], distance)
-
-    def _points(self, nodes: Array) -> Points:
-        return Points.on(nodes, self.slave.sides, self.tables)

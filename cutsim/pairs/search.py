@@ -99,11 +99,6 @@ class PartnerSearch:
         """Number that grows when other facets have come near each other."""
         return self._found.value.version
 
-    def nodes(self) -> Indices:
-        """Global nodes on which pairs of near facets act, those of the slave facet first; slave facets of this rank."""
-        slave, master = (facets[self._slave.owned[self.facets[0]]] for facets in self.facets)
-        return np.hstack([self._slave.global_nodes[slave], self._master.global_nodes[master]])
-
     def begin(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
         """Take a configuration for the start of a step; where its rays meet the master."""
         self._start = points, nodes

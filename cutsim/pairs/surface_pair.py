@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.kinematics import Expr
+from cutsim.base.memory import Memory
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.faces import Face, rows
@@ -21,9 +22,10 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import check_friction, completed
+from cutsim.pairs.material_partners import MaterialPartners
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface, SlaveSurface
 from cutsim.pairs.pair_law import PairLaws
-from cutsim.pairs.partners import PairKinematics
+from cutsim.pairs.partners import CurrentPartners, PairKinematics
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
 
 _AXES = "xyz"
@@ -33,7 +35,7 @@ Parts = NDArray[np.int32] | Face | Sequence[NDArray[np.int32] | Face]
 
 
 class SurfacePair(Term):
-    """Contact, friction or cohesion between two surfaces, or of one with itself; their meshes need not match.
+    """Contact, friction and cohesion between two surfaces, or of one with itself; their meshes need not match.
 
     The traction is integrated over the slave surface.  In two passes each surface is slave once, with half of the
     traction: a uniform pressure is then transmitted almost uniformly.  A surface that meets itself is slave and master,
@@ -44,13 +46,14 @@ class SurfacePair(Term):
         slave_facets: The slave surface, the finer or softer one: local exterior facets, ghosts included, a face of a
             crack (`Crack.face`) or of an open cut (`cutsim.fields.faces.Face.cut`), or a sequence of these.
         master_facets: The master surface; None for a surface that may fold and meet itself.
-        law: Cohesive law, with small sliding only; None for contact only.
+        law: Cohesive law of a bond between the points that face each other in the reference configuration, wherever
+            they slide; None for contact only.
         young: Young's modulus of the softer body, for the automatic penalty [stress].
         contact: Contact law; by default a penalty of 10 E/h.
         friction: Friction law, or the coefficient of Coulomb's, None for none; without a tangential penalty of its own
-            it takes that of the contact.
-        small_sliding: Whether each point keeps its partner of the reference configuration, as bonds do.
-            Otherwise partners are found in the current configuration.
+            it takes that of the contact. It acts where there is no bond, and on the broken fraction of one.
+        small_sliding: Whether contact and friction, too, act between the points that face each other in the reference
+            configuration. Otherwise their partners are found in the current configuration.
         allowed_penetration: If given, Uzawa augmentation until no facet penetrates more than this, in the mean
             [length].
         allowed_slip: If given, augmentation until no sticking facet slides more than this in a step, in the mean
@@ -70,8 +73,8 @@ class SurfacePair(Term):
         normal_size: Mean size of the cells normal to the slave surface, the h of the penalty [length].
 
     Raises:
-        ValueError: A parameter is outside its range, a surface has no facets, a side of a facet is there twice, or
-            points lie in the other body from the start without facing its surface.
+        ValueError: A parameter is outside its range, a surface has no facets, a side of a facet is there twice,
+            points lie in the other body from the start without facing its surface, or no point of a bond has a partner.
     """
 
     symmetric = False
@@ -99,7 +102,6 @@ class SurfacePair(Term):
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
         require_number("allowed_slip", allowed_slip, positive.or_none)
         require_number("search", search, positive.or_none)
-        require("small_sliding", small_sliding, small_sliding or law is None, "True with a cohesive law")
         self.folding = master_facets is None
         lasting = self.folding and small_sliding
         require("small_sliding", small_sliding, not lasting, "False for a surface that meets itself")
@@ -124,6 +126,9 @@ class SurfacePair(Term):
             self._pass(i, face, shared[-1 if i < len(slaves) else 0], laws, small_sliding, search or size)
             for i, face in enumerate((*slaves, *back))
         )
+        if law is not None:
+            bonded = sum(p.points.integral(p.bonded) for p in self.passes)
+            require("search", search or size, bonded > 0, "as large as the gap that the law bonds: it has no partners")
 
     def _pass(
         self, i: int, face: Face, master: SharedSurface, laws: PairLaws, small_sliding: bool, search: float
@@ -131,15 +136,9 @@ class SurfacePair(Term):
         """A part of one surface over all of the other one. Collective."""
         state, name = self.state, f"{self.name} pass {i + 1}"
         points = slave_points(state, face, "slave_facets" if self.signs[i] > 0 else "master_facets")
-        kinematics = PairKinematics(
-            state.memory,
-            name,
-            SlaveSurface(state.V, face, points),
-            master,
-            small_sliding=small_sliding,
-            search=search,
-            size=_mean(state, [face], facet_size),
-        )
+        surfaces, lengths = (SlaveSurface(state.V, face, points), master), (search, _mean(state, [face], facet_size))
+        bonded = laws.cohesive is not None
+        kinematics = _partners(state.memory, name, surfaces, lengths, small_sliding=small_sliding, bonded=bonded)
         weight = 0.5 if self.folding or -1 in self.signs else 1.0
         return SurfacePass(state, name, points, kinematics, laws, weight=weight)
 
@@ -197,8 +196,8 @@ class SurfacePair(Term):
         return np.sum(forces, axis=0) if forces else None
 
     def damage_increment(self) -> float:
-        """Largest growth of damage at a point in the trial step. Collective."""
-        return max(p.history.damage_increment() for p in self.passes)
+        """Largest growth of damage at a point in the trial step; 0 without a law. Collective."""
+        return 0.0 if self.law is None else max(p.history.damage_increment() for p in self.passes)
 
     def force(self) -> NDArray[np.float64]:
         """Force on the slave surface in the trial state, each pass counted with its share [force].
@@ -243,8 +242,27 @@ def _columns(pair: SurfacePair) -> dict[str, tuple[float, str]]:
         columns[f"{name}_{what}"] = (share * sum(parts), kind)
     if pair.law is not None:
         broken = sum(p.points.integral(p.history.trial["damage"]) for p in slaves)
-        columns[f"{name}_broken"] = (broken, kind)
+        columns[f"{name}_broken"] = (share * broken, kind)
     return columns
+
+
+def _partners(
+    memory: Memory,
+    name: str,
+    surfaces: tuple[SlaveSurface, SharedSurface],
+    lengths: tuple[float, float],
+    *,
+    small_sliding: bool,
+    bonded: bool,
+) -> list[PairKinematics]:
+    """What finds the partners of contact, then those of a bond where they are others. Collective."""
+    search, size = lengths
+    found: list[PairKinematics] = []
+    if not small_sliding:
+        found.append(CurrentPartners(memory, name, *surfaces, search=search, size=size))
+    if small_sliding or bonded:
+        found.append(MaterialPartners(memory, f"{name} bond", *surfaces, search=search, size=size))
+    return found
 
 
 def _faces(state: State, given: Parts, name: str) -> list[Face]:

@@ -1,25 +1,24 @@
 """Pass of a slave surface over a master surface: jump, law and forces of a step (docs/theory.md §3.5)."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from cutsim.base.assembly import add_blocks, owned_vector
+from cutsim.base.assembly import owned_vector
 from cutsim.base.checks import require
 from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
 from cutsim.interface.history import GAUSS, TRAPEZOID, InterfaceHistory
-from cutsim.pairs import nodal_forces
 from cutsim.pairs.configuration import Pairs
-from cutsim.pairs.nodal_forces import Tractions
+from cutsim.pairs.material_partners import MaterialPartners
+from cutsim.pairs.nodal_forces import Action, Coupling
+from cutsim.pairs.pair_forces import PairForces, add_pattern
 from cutsim.pairs.pair_law import PairLaw, PairLaws
 from cutsim.pairs.pairing import Array
 from cutsim.pairs.partners import DEGREES, PairKinematics
-
-# points whose tangents are held in memory at a time
-_CHUNK = 10_000
 
 
 def slave_points(state: State, face: Face, name: str) -> FacetPoints:
@@ -38,19 +37,21 @@ class SurfacePass:
     """Pass of a slave surface over a master surface. Every method is collective.
 
     The traction T acts on the slave, −T on the master.  Its components follow from the jump by the laws of a crack: the
-    jump is a function of the points, which is found beforehand.
+    jump is a function of the points, which is found beforehand.  On surfaces that slide far a bond has partners of its
+    own, see `PairLaw`.
 
     Args:
         state: Displacement and time.
         name: Name of the slave surface.
         points: Integration points on the slave facets.
-        kinematics: Finds the jump.
+        kinematics: Find the jump: one for contact, friction and bond, or one for contact and friction and another one
+            for the bond.
         laws: Laws.
         weight: Factor of the virtual work.
 
     Attributes:
         points: Integration points.
-        kinematics: Finds their partners.
+        kinematics: Finds the partners that they touch.
         weight: Factor of the virtual work.
         weights: Weights of the points, flattened, times the factor; zero where another rank adds them.
         history: What they remember of opening and damage.
@@ -63,18 +64,19 @@ class SurfacePass:
         state: State,
         name: str,
         points: FacetPoints,
-        kinematics: PairKinematics,
+        kinematics: Sequence[PairKinematics],
         laws: PairLaws,
         *,
         weight: float,
     ) -> None:
-        self._state, self.points, self.kinematics, self.weight = state, points, kinematics, weight
+        self._state, self.points, self.kinematics, self.weight = state, points, kinematics[0], weight
+        self._all = tuple(kinematics)
         self._dim = state.mesh.geometry.dim
-        own = np.where(kinematics.slave.owned[:, None], points.weights, 0.0)
+        own = np.where(self.kinematics.slave.owned[:, None], points.weights, 0.0)
         self.weights = weight * own.ravel()
-        rule = GAUSS if kinematics.small_sliding else TRAPEZOID
+        rule = GAUSS if isinstance(self.kinematics, MaterialPartners) else TRAPEZOID
         self.history = InterfaceHistory(state.memory, name, points, laws.cohesive, rule, ("held",))
-        self._law = PairLaw(state, name, points, laws, self.history, kinematics.pairs(self._start()))
+        self._law = PairLaw(state, name, points, laws, self.history, self._pairs_at(self._start()))
         self.slip, self.viscous = self._law.slip, self._law.viscous
         self._seen: Array | None = None
         self._force = state.memory.value(f"{name}: force", np.zeros(self._dim))
@@ -84,32 +86,38 @@ class SurfacePass:
         """Force on the slave surface in the trial state [force]."""
         return self._force.trial
 
-    def _tractions(self, *, linearised: bool) -> Tractions:
-        """Tractions for the jump that was found last."""
-        if linearised:
-            return Tractions(*self._law.linear(), self.weights)
-        values = self._law.traction()
-        return Tractions(values, np.zeros((*values.shape, self._dim)), self.weights)
+    @property
+    def bonded(self) -> Values:
+        """1 at the points with a partner that a cohesive law may bond them to, else 0."""
+        return self._law.bonded
 
     # -- configurations -------------------------------------------------------------------------------------------
 
     def partners(self) -> Pairs:
-        """Pairs at the present displacement; the law knows their jump then."""
+        """Pairs that touch at the present displacement; the law knows their jump, and that of the bond, then."""
+        return self._now()[0]
+
+    def _now(self) -> tuple[Pairs, ...]:
+        """Pairs of each kind at the present displacement; the law knows their jumps then."""
         u = self._state.u.x.array
         # the search is collective: all ranks look again, or none
         same = self._seen is not None and np.array_equal(u, self._seen)
         if not self._state.mesh.comm.allreduce(same, op=MPI.LAND):
-            self._pairs = self.kinematics.pairs(self.kinematics.nodes(u))
+            self._pairs = self._pairs_at(self.kinematics.nodes(u))
             self._seen = u.copy()
             self._law.set_pairs(self._pairs)
         return self._pairs
+
+    def _pairs_at(self, nodes: tuple[Array, Array]) -> tuple[Pairs, ...]:
+        return tuple(kinematics.pairs(nodes) for kinematics in self._all)
 
     def _shaped(self, values: Array) -> Values:
         return values.reshape(self.points.weights.shape)
 
     def begin(self) -> None:
         """Start a step from the committed displacement."""
-        self.kinematics.begin(self._start())
+        for kinematics in self._all:
+            kinematics.begin(self._start())
         self._seen = None
 
     def evaluate(self) -> None:
@@ -120,12 +128,12 @@ class SurfacePass:
             if part is not None:
                 part.evaluate()
         self._force.trial = self._state.mesh.comm.allreduce(self.point_forces().sum(axis=0))
-        self.kinematics.note(self.partners())
+        for kinematics, pairs in zip(self._all, self._now(), strict=True):
+            kinematics.note(pairs)
 
     def point_forces(self) -> Array:
         """Present forces on the slave at the points, shape (points, dimension); zero where another rank adds them."""
-        pairs, tractions = self.partners(), self._tractions(linearised=False)
-        return np.asarray(np.einsum("n,na,nai->ni", self.weights, tractions.values, pairs.slave.frames))
+        return np.asarray(sum(self.weights[:, None] * action.traction() for action in self._forces().actions))
 
     def _start(self) -> tuple[Array, Array]:
         return self.kinematics.nodes(self._state.u_old.x.array, start=True)
@@ -133,14 +141,14 @@ class SurfacePass:
     def _along(self, ends: tuple[tuple[Array, Array], ...], s: float) -> dict[str, Values]:
         """Values on the way of the step, see `cutsim.interface.history.Along`."""
         (slave, master), (slave_end, master_end) = ends
-        pairs = self.kinematics.pairs(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
+        pairs = self._pairs_at(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
         self._law.set_pairs(pairs)
-        values = self._law.values()
-        change = pairs.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
-        power = np.einsum("nai,ni->na", pairs.slave.frames, change)
+        values, touching = self._law.values(), pairs[0]
+        change = touching.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
+        power = np.einsum("nai,ni->na", touching.slave.frames, change)
         return values | {
             "contact_power": -values["pressure"] * self._shaped(power[:, 0]),
-            "opening": self._shaped(pairs.jump[:, 0]),
+            "opening": self._shaped(touching.jump[:, 0]),
         }
 
     def augment(self) -> bool:
@@ -165,63 +173,46 @@ class SurfacePass:
 
     # -- forces ---------------------------------------------------------------------------------------------------
 
+    def _forces(self, *, linearised: bool = False) -> PairForces:
+        """Forces at the present displacement, with or without their derivatives."""
+        pairs = self._now()
+        tractions, stiffness, coupling = self._law.linear() if linearised else self._law.constant()
+        actions = [
+            Action(kinematics, there, self.weights, values, rate)
+            for kinematics, there, values, rate in zip(self._all, pairs, tractions, stiffness, strict=True)
+        ]
+        return PairForces(actions, None if coupling is None else Coupling(actions[0], actions[1], coupling))
+
     @property
     def pattern(self) -> int:
         """Number of the sparsity pattern."""
-        return self.kinematics.partners.version
+        return self.kinematics.version
 
     def prepare(self) -> None:
         """Nothing: partners are found when forces are asked for."""
 
     def add_forces(self, b: PETSc.Vec, along: Array | None) -> None:
         """Add nodal forces, as `cutsim.base.terms.Assembler.add_forces`."""
-        self.partners()
-        self._add(b, self._tractions(linearised=along is not None), along)
+        self._forces(linearised=along is not None).add(b, along)
 
     def rate_forces(self) -> Array | None:
         """Nodal forces of the viscosity of the bond, owned entries; None without it."""
         if self.viscous is None:
             return None
-        self.partners()
-        values = self.viscous.values().reshape(-1, self._dim)
+        pairs, values = self._now()[-1], self.viscous.values().reshape(-1, self._dim)
+        none = np.zeros((*values.shape, self._dim))
         dofmap = self._state.V.dofmap
         b = owned_vector(dofmap.index_map, dofmap.index_map_bs)
-        self._add(b, Tractions(values, np.zeros((*values.shape, self._dim)), self.weights), None)
+        PairForces([Action(self._all[-1], pairs, self.weights, values, none)]).add(b)
         b.assemble()
         forces = b.array.copy()
         b.destroy()
         return forces
 
-    def _add(self, b: PETSc.Vec, tractions: Tractions, along: Array | None) -> None:
-        """Add the nodal forces of tractions."""
-        kinematics, pairs = self.kinematics, self.partners()
-        rows = nodal_forces.active(kinematics, pairs, tractions)
-        forces = nodal_forces.forces(kinematics, pairs, tractions, rows)
-        if along is not None:
-            change = kinematics.at_stencil(along, pairs, rows)
-            forces += np.einsum("nricj,ncj->nri", nodal_forces.tangents(kinematics, pairs, tractions, rows), change)
-        dofs = self.dofs(nodal_forces.nodes(kinematics, pairs, rows))
-        # nodes of a rigid master have none; matrices pass over them unasked
-        b.setOption(PETSc.Vec.Option.IGNORE_NEGATIVE_INDICES, True)
-        b.setValues(dofs.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
-
     def add_tangent(self, A: PETSc.Mat) -> None:
         """Add the tangent, as `cutsim.base.terms.Assembler.add_tangent`."""
-        kinematics, pairs, tractions = self.kinematics, self.partners(), self._tractions(linearised=True)
-        rows = nodal_forces.active(kinematics, pairs, tractions)
-        for some in np.array_split(rows, 1 + len(rows) // _CHUNK):
-            starts, nodes = nodal_forces.stencils(kinematics, pairs, some)
-            if len(starts):
-                blocks = np.add.reduceat(nodal_forces.tangents(kinematics, pairs, tractions, some), starts)
-                dofs = self.dofs(nodes)
-                add_blocks(A, dofs, blocks.reshape(*dofs.shape, dofs.shape[1]))
+        self._forces(linearised=True).add_tangent(A)
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.base.terms.Assembler.add_pattern`."""
-        dofs = self.dofs(self.kinematics.partners.nodes())
-        for some in np.array_split(dofs, 1 + len(dofs) // _CHUNK):
-            add_blocks(A, some, np.zeros((*some.shape, some.shape[1])))
-
-    def dofs(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Global dofs of global nodes, shape (…, nodes) → (…, dofs); negative for −1."""
-        return (nodes[..., None] * self._dim + np.arange(self._dim)).reshape(len(nodes), self._dim * nodes.shape[1])
+        add_pattern(A, self._all)

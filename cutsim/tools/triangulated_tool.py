@@ -22,9 +22,10 @@ from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.slip import SlipHistory, check_friction, completed
 from cutsim.pairs.outer_surface import OuterSurface, SlaveSurface
 from cutsim.pairs.overlap import inside_surface
+from cutsim.pairs.pair_forces import dofs_of
 from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.pairing import Array, FacetShape, Indices
-from cutsim.pairs.partners import PairKinematics
+from cutsim.pairs.partners import CurrentPartners
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import ToolPath
@@ -75,7 +76,7 @@ class _Touch(SurfacePass):
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros for all facets. Collective."""
         slave = self.kinematics.slave
-        dofs = self.dofs(slave.global_nodes[slave.owned])
+        dofs = dofs_of(slave.global_nodes[slave.owned], slave.reference.shape[-1])
         add_blocks(A, dofs, np.zeros((*dofs.shape, dofs.shape[1])))
 
 
@@ -128,12 +129,10 @@ class TriangulatedTool(RigidTool):
         self.contact, self.surface = contact, surface
         self._normal_size = points.mean(normal_size(state.mesh, points.facets))
         slave = SlaveSurface(state.V, face, points)
-        kinematics = PairKinematics(
-            state.memory, name, slave, master, small_sliding=False, search=search or size, size=size
-        )
+        kinematics = CurrentPartners(state.memory, name, slave, master, search=search or size, size=size)
         law = completed(friction, contact.stiffness) if friction else None
         laws = PairLaws(None, contact, law, None, None)
-        self.touch = _Touch(state, name, points, kinematics, laws, weight=1.0)
+        self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0)
 
     @property
     def slips(self) -> Sequence[SlipHistory]:

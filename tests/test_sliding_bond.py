@@ -1,0 +1,125 @@
+"""Bonds between surfaces that do not match and slide far: on material partners, contact on the current ones (§3.5)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.friction import Coulomb
+from cutsim.materials.elastic import LinearElastic
+from helpers.boxes import two
+from helpers.fields import wavy
+from helpers.laws import EXPONENTIAL, E
+from helpers.runs import history
+from helpers.tangents import STEPS, Assembled, slopes
+
+KINDS = pytest.mark.parametrize("small_sliding", [False, True], ids=["sliding", "small sliding"])
+
+# -- tangent ----------------------------------------------------------------------------------------------------------
+
+# mean jump of a bond (sliding, opening) over its characteristic openings of 0.1 and 0.2
+JUMPS = {"opening": (0.02, 0.15), "sliding": (0.25, 0.0), "both": (0.15, 0.08), "pressed": (0.26, -0.03)}
+STICK, SLIP = Coulomb(50.0, 7.0), Coulomb(0.4, 1e3)
+
+
+def bonded(gdim, jump, past=1.0, law=EXPONENTIAL, friction=STICK, small_sliding=False, overhang=0.5, **options):
+    """Two boxes with a bond whose mean jump has been a multiple of what it is now; the problem and a displacement."""
+    b = two(gdim, overhang=overhang, comm=MPI.COMM_SELF, **options)
+    contact = PenaltyContact(20.0)
+    pair = b.pair(law=law, small_sliding=small_sliding, friction=friction, contact=contact, search=0.5)
+    shift = np.zeros(3)
+    shift[0], shift[gdim - 1] = jump
+    if past > 1:
+        b.move(lambda x: past * shift[:, None] + 0 * x, 1)
+        pair.evaluate()
+        b.state.commit()
+    pair.begin()
+    b.move(lambda x: shift[:, None] + 0 * x, 1)
+    return pair, Assembled(pair, b.state), b.state.u.x.array + wavy(b.state.V, 1, 0.004)
+
+
+def assert_exact(problem, u):
+    """The tangent is that of the forces, from the matrix and along a direction, and the forces are in balance."""
+    V = problem.state.V
+    w = wavy(V, 3, 0.01)
+    f, slope = problem.forces(u), problem.matrix(u) @ w
+    remainders = np.array([np.linalg.norm(problem.forces(u + h * w) - f - h * slope) for h in STEPS])
+    assert remainders[0] > 1e-9 * np.linalg.norm(slope)
+    assert slopes(STEPS, remainders).min() > 1.95, remainders
+    np.testing.assert_allclose(problem.forces(u, w), f + slope, atol=1e-12 * np.linalg.norm(slope))
+    assert np.abs(f.reshape(-1, V.dofmap.index_map_bs).sum(axis=0)).max() < 1e-13 * np.abs(f).sum()
+
+
+@KINDS
+@pytest.mark.parametrize("past", [1.0, 1.6], ids=["loading", "unloading"])
+@pytest.mark.parametrize("jump", JUMPS)
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_tangent(gdim, jump, past, small_sliding):
+    """On its envelope and below it, with friction on what is broken."""
+    assert_exact(*bonded(gdim, JUMPS[jump], past, small_sliding=small_sliding)[1:])
+
+
+@pytest.mark.parametrize("friction", [STICK, SLIP], ids=["stick", "slip"])
+@pytest.mark.parametrize(
+    ("gdim", "simplices", "degree"), [(2, False, 1), (2, True, 2), (3, False, 1), (3, True, 1), (3, False, 2)]
+)
+def test_tangent_of_a_bond_that_has_slid_far(gdim, simplices, degree, friction):
+    """A long bond, half broken where it is pressed, some facets away from where its points were bonded."""
+    law = replace(EXPONENTIAL, shear_opening=1.0)
+    mesh = {"n": (8, 4) if gdim == 2 else (6, 2), "overhang": 1.5, "simplices": simplices, "degree": degree}
+    pair, problem, u = bonded(gdim, (1.3, -0.03), law=law, friction=friction, **mesh)
+    assert_exact(problem, u)
+    first = pair.passes[0]
+    share = first.slip._evaluate()["share"]
+    assert 0.2 < np.median(share) < 0.8
+    assert len(first._forces(linearised=True).coupling.rows[0]) > 0.3 * share.size, "contact and bond are coupled"
+
+
+@pytest.mark.parametrize("offset", [-2e-3, 2e-3])
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_tangent_beside_an_edge(gdim, offset):
+    """The middle point of a facet has slid to just before or behind an edge of the master, while its bond breaks."""
+    pair, problem, u = bonded(gdim, (0.25 + offset, -0.05), friction=SLIP, n=(8, 3))
+    assert_exact(problem, u)
+    xi = pair.passes[0].partners().hits.xi
+    assert 0 < min(xi.min(), (1 - xi).min()) < 0.02
+
+
+# -- bond -------------------------------------------------------------------------------------------------------------
+
+
+def envelope(opening, sliding):
+    """Normal and shear traction of the exponential law under growing openings (van den Bosch et al.)."""
+    x, y = opening / EXPONENTIAL.opening, sliding / EXPONENTIAL.shear_opening
+    normal, shear = EXPONENTIAL.toughness / 0.1, EXPONENTIAL.shear_toughness / 0.2
+    return normal * x * np.exp(-x - y**2), 2 * shear * y * (1 + x) * np.exp(-x - y**2)
+
+
+@pytest.mark.parametrize("pull", [(1.0, 0.0), (0.0, 1.0), (0.5, 1.0)], ids=["opened", "slid", "both"])
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_bond_between_meshes_that_do_not_match(gdim, pull):
+    """Pulled, sheared, and both, as a whole: force and work of separation of the law, whatever the meshes."""
+    b = two(gdim)
+    pair, up = b.pair(law=EXPONENTIAL, small_sliding=True), gdim - 1
+    way = np.append(pull[1] * np.array([[1.0], [0.6, 0.8]][gdim - 2]), pull[0])
+    rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
+    moved = [
+        Support(b.state, b.cells(1), i, lambda t, part=part: part * t, dim=gdim, name=f"top_{'xyz'[i]}")
+        for i, part in enumerate(way)
+    ]
+    mechanics = Mechanics(b.state, [Solid(b.state, LinearElastic(E, 0.3)), pair], rigid + moved)
+    rows = history(mechanics, 1.5, StepControl(first=0.15, largest=0.15))
+    normal, shear = envelope(pull[0] * rows["time"], pull[1] * rows["time"])
+    force = np.array([rows[f"top_{'xyz'[i]}_force"] for i in range(gdim)])
+    np.testing.assert_allclose(force[up], normal, rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(force[:up], np.outer(way[:up], shear) / max(pull[1], 1e-300), rtol=1e-8, atol=1e-12)
+    s = np.linspace(0.0, 1.5, 20_001)
+    work = np.trapezoid(np.dot(pull, envelope(pull[0] * s, pull[1] * s)), s)
+    np.testing.assert_allclose(rows["energy_fracture"][-1], work, rtol=5e-3)
+    np.testing.assert_allclose(rows["pair_broken"][-1], 1.0, rtol=5e-3)
