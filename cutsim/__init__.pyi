@@ -19,6 +19,7 @@ from .fields.meshing import read_geo as read_geo
 from .fields.meshing import read_mesh as read_mesh
 from .fields.meshing import tag_mesh as tag_mesh
 from .fields.points import Surface as Surface
+from .fields.refinement import Refinement as Refinement
 from .fields.space import cracked_space as cracked_space
 from .fields.state import State as State
 from .fields.temperature import Temperature as Temperature
@@ -86,6 +87,7 @@ from .studies.fixture import Fixture as Fixture
 from .studies.insertion import Insertion as Insertion
 from .studies.layered import Layer as Layer
 from .studies.layered import LayeredBlock as LayeredBlock
+from .studies.mesh_rule import MeshRule as MeshRule
 from .studies.picture import draw_insertion as draw_insertion
 from .tools.pointed import Blade as Blade
 from .tools.pointed import Needle as Needle

@@ -10,6 +10,8 @@
 //
 // dim = 3: z from 0 to B, faces "front" (z = 0) and "back" (z = B). With sym = 1 only the half 0 < z < B/2 of a
 // block centred on z = 0, faces "symmetry" (z = 0) and "back" (z = B/2). With notch = 0 there is no facet "notch".
+// Sizes: lc along the crack down to `deep` and across it to `band`, growing from there; smaller ones, from `entry` on, at
+// the mouth of the crack or of the notch, where a tool that starts above the surface indents it.
 Include "common.geo";
 DefineConstant[
   dim    = {3,    Name "dim"},     // 2 or 3
@@ -20,7 +22,9 @@ DefineConstant[
   notch  = {0.5,  Name "notch"},   // depth of the starting notch
   lc     = {0.2,  Name "lc"},      // largest element size along the crack and across the band
   band   = {1.0,  Name "band"},    // half width of the zone of uniform size about the crack
-  growth = {1.25, Name "growth"},  // ratio of neighbouring sizes outside the band
+  deep   = {0,    Name "deep"},    // depth of the fine part, 0: all of the thickness
+  entry  = {0,    Name "entry"},   // element size at the mouth, 0: as along the crack
+  growth = {1.25, Name "growth"},  // ratio of neighbouring sizes outside of the fine part
   nz     = {10,   Name "nz"}       // layers of elements across the modelled width (dim = 3)
 ];
 If (dim != 2 && dim != 3)
@@ -32,27 +36,36 @@ EndIf
 If (notch < 0 || notch >= H || band <= 0 || band >= Lx)
   Error("notch = %g must lie in [0, H = %g) and band = %g in (0, Lx = %g)", notch, H, band, Lx);
 EndIf
-
-Point(1) = {0, -H, 0};
-Point(2) = {0, -notch, 0};
-Line(1) = {1, 2};
-Transfinite Curve{1} = Ceil((H - notch) / lc - 1e-9) + 1;
-lines[] = {1};
-If (notch > 0)
-  Point(3) = {0, 0, 0};
-  Line(2) = {2, 3};
-  Transfinite Curve{2} = Ceil(notch / lc - 1e-9) + 1;
-  lines[] += {2};
+If (deep < 0 || deep > H || deep > 0 && deep <= notch || entry < 0)
+  Error("deep = %g must be 0 or lie in (notch = %g, H = %g], entry = %g must be at least 0", deep, notch, H, entry);
 EndIf
 
-n_band = Ceil(band / lc - 1e-9);
-size = growth * band / n_band;
-length = Lx - band;
-largest = Lx;
-Call Graded;
+deepest = deep > 0 ? deep : H;
+mouth = entry; // of the crack, if there is no notch
+lines[] = {};
+foot = 1;
+Point(foot) = {0, 0, 0};
+If (notch > 0)
+  length = notch;
+  fine = notch;
+  Call FromMouth;
+  rim[] = Extrude {0, -notch, 0} { Point{foot}; Layers{layers[], ends[]}; };
+  foot = rim[0];
+  lines[] += {rim[1]};
+  entry = 0;
+EndIf
+length = H - notch;
+fine = deepest - notch;
+Call FromMouth;
+crack[] = Extrude {0, -length, 0} { Point{foot}; Layers{layers[], ends[]}; };
+lines[] += {crack[1]};
+
+length = Lx;
+fine = band;
+entry = mouth;
+Call FromMouth;
 For side In {-1:1:2}
-  out[] = Extrude {side * band, 0, 0} { Curve{lines[]}; Layers{n_band}; Recombine; };
-  Extrude {side * length, 0, 0} { Curve{out[{0:#out[] - 1:4}]}; Layers{layers[], ends[]}; Recombine; }
+  Extrude {side * Lx, 0, 0} { Curve{lines[]}; Layers{layers[], ends[]}; Recombine; }
 EndFor
 depth = sym ? B / 2 : B;
 Call Thicken;

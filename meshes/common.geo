@@ -20,6 +20,44 @@ Macro Graded
   EndFor
 Return
 
+// Layers from the mouth of a crack over the length `length`, along it or away from it: of size lc up to `fine`, or growing
+// by a fifth from `entry` to lc if 0 < entry < lc; beyond, growing by the ratio `growth`. Result: layers[], ends[].
+Macro FromMouth
+  whole = length;
+  outer = growth;
+  length = fine < whole ? fine : whole;
+  inner = length;
+  size = entry > 0 && entry < lc ? entry : lc;
+  growth = 1.2;
+  largest = lc;
+  Call Graded;
+  near[] = ends[];
+  last = #near[] > 1 ? near[#near[] - 1] - near[#near[] - 2] : 1;
+  growth = outer;
+  length = whole - inner;
+  size = growth * inner * last;
+  largest = whole;
+  If (length > 1e-9 * whole)
+    Call Graded;
+  Else
+    ends[] = {};
+  EndIf
+  layers[] = {};
+  all[] = {};
+  For i In {0:#near[] - 1}
+    layers[] += {1};
+    all[] += {near[i] * inner / whole};
+  EndFor
+  If (#ends[] > 0)
+    For i In {0:#ends[] - 1}
+      layers[] += {1};
+      all[] += {(inner + length * ends[i]) / whole};
+    EndFor
+  EndIf
+  ends[] = all[];
+  length = whole;
+Return
+
 // Extrude the whole plane section from z = 0 to z = depth in nz layers (dim = 3 only).
 Macro Thicken
   If (dim == 3)

@@ -9,6 +9,7 @@
 //     -L         bottom        L
 //
 // The plane x = 0 is the crack, but for the notch 0 < z < slit, -notch < y < 0. Faces "symmetry" (z = 0), "back" (z = B).
+// With notch = 0 there is no facet "notch", and `slit` is the half width of the fine part.
 // Sizes: lc down to `deep`, out to `band` and along z to `slit`, growing from there.
 Include "common.geo";
 DefineConstant[
@@ -20,33 +21,50 @@ DefineConstant[
   deep   = {6,   Name "deep"},    // depth of the fine part
   band   = {0.8, Name "band"},    // half width of the fine part
   lc     = {0.2, Name "lc"},      // element size there
+  entry  = {0,   Name "entry"},   // element size at the mouth, from which they grow to lc; 0: lc
   growth = {1.4, Name "growth"}   // ratio of neighbouring sizes outside
 ];
 If (lc <= 0 || growth <= 1 || band <= 0 || band >= L || slit <= 0 || slit >= B)
   Error("lc = %g must be > 0, growth = %g > 1, band = %g in (0, L = %g), slit = %g in (0, B = %g)", lc, growth, band, L, slit, B);
 EndIf
-If (notch <= 0 || notch >= deep || deep >= H)
-  Error("notch = %g must lie in (0, deep = %g), deep in (0, H = %g)", notch, deep, H);
+If (notch < 0 || notch >= deep || deep >= H)
+  Error("notch = %g must lie in [0, deep = %g), deep in (0, H = %g)", notch, deep, H);
 EndIf
 
-Point(1) = {0, -deep, 0};
-mouth[] = Extrude {0, deep - notch, 0} { Point{1}; Layers{Ceil((deep - notch) / lc - 1e-9)}; };
-rim[] = Extrude {0, notch, 0} { Point{mouth[0]}; Layers{Ceil(notch / lc - 1e-9)}; };
-size = growth * lc;
-length = H - deep;
-largest = H;
-Call Graded;
-foot[] = Extrude {0, -length, 0} { Point{1}; Layers{layers[], ends[]}; };
+mouth = entry; // of the crack, if there is no notch
+lines[] = {};
+foot = 1;
+Point(foot) = {0, 0, 0};
+If (notch > 0)
+  length = notch;
+  fine = notch;
+  Call FromMouth;
+  rim[] = Extrude {0, -notch, 0} { Point{foot}; Layers{layers[], ends[]}; };
+  foot = rim[0];
+  lines[] += {rim[1]};
+  entry = 0;
+EndIf
+length = H - notch;
+fine = deep - notch;
+Call FromMouth;
+crack[] = Extrude {0, -length, 0} { Point{foot}; Layers{layers[], ends[]}; };
+lines[] += {crack[1]};
 
-length = L - band;
-Call Graded;
+length = L;
+fine = band;
+entry = mouth;
+Call FromMouth;
 For side In {-1:1:2}
-  out[] = Extrude {side * band, 0, 0} { Curve{mouth[1], rim[1], foot[1]}; Layers{Ceil(band / lc - 1e-9)}; Recombine; };
-  Extrude {side * length, 0, 0} { Curve{out[{0:#out[] - 1:4}]}; Layers{layers[], ends[]}; Recombine; }
+  Extrude {side * L, 0, 0} { Curve{lines[]}; Layers{layers[], ends[]}; Recombine; }
 EndFor
 
 sections[] = Surface{:};
-near[] = Extrude {0, 0, slit} { Surface{sections[]}; Layers{Ceil(slit / lc - 1e-9)}; Recombine; };
+length = slit;
+fine = slit;
+Call FromMouth;
+near[] = Extrude {0, 0, slit} { Surface{sections[]}; Layers{layers[], ends[]}; Recombine; };
+size = growth * lc;
+largest = B;
 length = B - slit;
 Call Graded;
 Extrude {0, 0, length} { Surface{near[{0:#near[] - 1:6}]}; Layers{layers[], ends[]}; Recombine; }
@@ -60,8 +78,10 @@ name = "top_left";  box[] = {-L, 0, 0, 0};   Call Facets;
 name = "top_right"; box[] = {0, L, 0, 0};    Call Facets;
 name = "bottom";    box[] = {-L, L, -H, -H}; Call Facets;
 name = "symmetry";                           Call Ends;
-notched[] = Surface In BoundingBox{-e, -notch - e, -e, e, e, slit + e};
 plane[] = Surface In BoundingBox{-e, -H - e, -e, e, e, B + e};
-plane[] -= notched[];
-Physical Surface("notch") = notched[];
+If (notch > 0)
+  notched[] = Surface In BoundingBox{-e, -notch - e, -e, e, e, slit + e};
+  plane[] -= notched[];
+  Physical Surface("notch") = notched[];
+EndIf
 Physical Surface("crack") = plane[];

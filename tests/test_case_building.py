@@ -6,6 +6,7 @@ import pytest
 from mpi4py import MPI
 
 from cutsim.cases import CaseError, read_case
+from cutsim.cases.domains import Domain
 
 COMM = MPI.COMM_WORLD
 
@@ -203,3 +204,53 @@ def test_what_does_not_go_with_the_mesh_is_named(written, old, new, words):
     assert old in STRIP
     with pytest.raises(CaseError, match=rf"case.toml:\d+: {words}"):
         read_case(written(STRIP.replace(old, new))).build(COMM)
+
+
+#: An insertion into an intact block; its sizes follow from the tool and the law, whose opening is 0.5 / e mm.
+BY_RULE = """
+title = "by the rule"
+[mesh]
+geometry = "block"
+dim = 2
+set = { Lx = 1, H = 2, band = 0.2, notch = 0, growth = 2 }
+[material]
+model = "neo-hookean"
+young = 1
+poisson = 0.4
+[law]
+model = "exponential"
+strength = 1
+toughness = 0.5
+[tool]
+shape = "blade"
+half_angle = 0.3
+tip_radius = 0.3
+half_thickness = 0.4
+[insertion]
+speed = 1
+depth = 1
+[steps]
+fixed = 0.5
+"""
+
+
+@pytest.mark.parametrize(
+    ("radius", "notch", "along", "mouth"),
+    [(0.3, 0, 0.2 / np.e, 0.1 / np.e), (0.03, 0, 0.03, 0.01), (0.03, 0.5, 0.03, 0.03)],
+)
+def test_sizes_follow_from_tool_and_law(written, radius, notch, along, mouth):
+    """min(r, 0.4 ε) along the crack; at the mouth without a notch also a third of r and half of that."""
+    text = BY_RULE.replace("tip_radius = 0.3", f"tip_radius = {radius}").replace("notch = 0", f"notch = {notch}")
+    case = read_case(written(text.replace("speed = 1", f"speed = 1\nnotch = {notch}")))
+    tagged = Domain.of(case, case.document, COMM).tagged
+    y = tagged.mesh.geometry.x[tagged.mesh.geometry.x[:, 0] == 0, 1]
+    steps = -np.diff(np.sort(y)[::-1])
+    assert 0.9 * along < steps.max() <= along * (1 + 1e-9)
+    assert 0.7 * mouth < steps[0] <= mouth * (1 + 1e-9)
+
+
+def test_a_rule_needs_a_tool_and_a_law(written):
+    with pytest.raises(CaseError, match=r"mesh\.set\.lc: must be a number: 'rule' needs a tool"):
+        read_case(written(STRIP.replace("lc = 0.5", 'lc = "rule"'))).build(COMM)
+    with pytest.raises(CaseError, match=r"set\.growth"):
+        read_case(written(STRIP.replace("growth = 1", 'growth = "rule"')))

@@ -14,6 +14,7 @@ from mpi4py import MPI
 
 from cutsim.base.assembly import box
 from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_mesh, tag_mesh
+from cutsim.fields.refinement import Refinement
 from cutsim.fields.sizes import facet_size, global_range, normal_size
 
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -135,6 +136,83 @@ def test_block_is_uniform_along_the_crack_and_across_the_band():
     assert sizes[:4] == pytest.approx(0.25)
     assert sizes[5:] / sizes[4:-1] == pytest.approx(1.25)
     assert 0.25 <= 1.25 * sizes[4] and sizes[4] <= 1.25 * 0.25
+
+
+@pytest.mark.parametrize("notch", [0, 0.5])
+def test_a_block_is_finest_at_the_mouth_and_coarser_below_the_fine_part(notch):
+    sizes = {"dim": 2, "H": 4, "notch": notch, "lc": 0.25, "deep": 2, "band": 1, "growth": 1.5, "entry": 0.05}
+    tagged = meshed("block", sizes)
+    names = ("crack", "notch") if notch else ("crack",)
+    heights = [tagged.mesh.geometry.x[nodes_of(tagged, name), 1] for name in names]
+    levels = np.unique(np.concatenate([y for part in COMM.allgather(heights) for y in part]).round(9))[::-1]
+    below = levels < -2 + 1e-6
+    fine, coarse = -np.diff(levels[levels > -2 - 1e-6]), -np.diff(levels[below])
+    assert (levels[0], levels[below][0], levels[-1]) == pytest.approx((0, -2, -4))
+    assert 0.03 < fine[0] <= 0.05 and fine.max() <= 0.25 * (1 + 1e-9)
+    assert len(coarse) > 2 and coarse[1:] / coarse[:-1] == pytest.approx(1.5)
+
+
+def nodes_of(tagged, name):
+    facets = tagged.facets(name)
+    return dolfinx.mesh.entities_to_geometry(tagged.mesh, 1, facets).ravel() if len(facets) else np.empty(0, np.int32)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_refinement_along_a_crack_keeps_all_groups(tmp_path, dim):
+    """Two boxes with the crack between them: measures of all groups stay, facets of the crack get as small as asked."""
+
+    def draw():
+        occ = gmsh.model.occ
+        draw = occ.addBox if dim == 3 else occ.addRectangle
+        for x in (0, 1):
+            draw(x, 0, 0, 1, *([1] * (dim - 1)))
+        occ.fragment([(dim, 1)], [(dim, 2)])
+        occ.synchronize()
+        for tag, name in enumerate(("left", "right"), start=1):
+            gmsh.model.addPhysicalGroup(dim, [tag], name=name)
+        faces = [tag for _, tag in gmsh.model.getEntities(dim - 1)]
+        middles = {tag: occ.getCenterOfMass(dim - 1, tag) for tag in faces}
+        gmsh.model.addPhysicalGroup(dim - 1, [tag for tag, x in middles.items() if abs(x[0] - 1) < 1e-6], name="crack")
+        gmsh.model.addPhysicalGroup(dim - 1, [tag for tag, x in middles.items() if abs(x[1]) < 1e-6], name="low")
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.5)
+        gmsh.model.mesh.generate(dim)
+
+    path = drawn(tmp_path / "boxes.msh", draw)
+    coarse = read_mesh(path, COMM, dim)
+    fine = read_mesh(path, COMM, dim, refine=Refinement(("crack",), 0.15, 2.0))
+    assert fine.names == coarse.names
+    for tagged in (coarse, fine):
+        for name in ("left", "right"):
+            assert measure(tagged.mesh, "dx", tagged.cells(name)) == pytest.approx(1)
+        assert measure(tagged.mesh, "dS", tagged.facets("crack")) == pytest.approx(1)
+        assert measure(tagged.mesh, "ds", tagged.facets("low")) == pytest.approx(2)
+    assert longest_edge(coarse, "crack") > 0.15 >= longest_edge(fine, "crack") > 0.07
+    assert longest_edge(fine, "low") > 0.15  # it grows away
+
+
+def longest_edge(tagged, name):
+    mesh, facets = tagged.mesh, tagged.facets(name)
+    nodes = (
+        dolfinx.mesh.entities_to_geometry(mesh, mesh.topology.dim - 1, facets) if len(facets) else np.empty((0, 2), int)
+    )
+    x = mesh.geometry.x[nodes]
+    lengths = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2)
+    return COMM.allreduce(float(lengths.max(initial=0.0)), MPI.MAX)
+
+
+def test_only_straight_simplices_are_refined(tmp_path):
+    def draw():
+        gmsh.model.occ.addRectangle(0, 0, 0, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(2, [1], name="body")
+        gmsh.model.addPhysicalGroup(1, [1], name="low")
+        gmsh.model.mesh.setTransfiniteAutomatic()
+        gmsh.option.setNumber("Mesh.RecombineAll", 1)
+        gmsh.model.mesh.generate(2)
+
+    path = drawn(tmp_path / "square.msh", draw)
+    with pytest.raises(ValueError, match="refine = .* must be None for cells of the kind 'quadrilateral'"):
+        read_mesh(path, COMM, 2, refine=Refinement(("low",), 0.1))
 
 
 def top_edges(tagged):

@@ -15,11 +15,13 @@ from cutsim.cases.geometries import LAMINATE, outline
 from cutsim.cases.keys import Keys, nearest
 from cutsim.cases.refusals import refused, refusing
 from cutsim.cases.schema import CaseTables
-from cutsim.cases.schema_mesh import Selection
+from cutsim.cases.schema_mesh import ALONG, RULE, SIZES, Selection
 from cutsim.fields.laminate import laminate
 from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_mesh
+from cutsim.fields.refinement import Refinement
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
+from cutsim.studies.mesh_rule import MeshRule
 
 Entities = NDArray[np.int32]
 # what entities of a codimension are called
@@ -146,13 +148,48 @@ class Domain:
 
 def _meshed(tables: CaseTables, document: Document, comm: MPI.Comm) -> TaggedMesh:
     mesh = tables.mesh
+    given = _parameters(tables, document)
     if mesh.geometry == LAMINATE:
-        sizes: dict[str, Any] = {name: int(size) if name in _COUNTS else size for name, size in mesh.set.items()}
+        sizes: dict[str, Any] = {name: int(size) if name in _COUNTS else size for name, size in given.items()}
         return laminate(comm, {layer.name: layer.thickness for layer in tables.layers}, **sizes)
     if mesh.dim is None:
         raise refused(document, ("mesh", "dim"), "missing, must be given: 2 or 3, the dimension of mesh and space")
     if mesh.file is not None:
-        return read_mesh(mesh.file, comm, mesh.dim, scale=mesh.scale, only=mesh.only or None, merge=mesh.merge)
+        refine = _refinement(tables, document)
+        only, merge = mesh.only or None, mesh.merge
+        return read_mesh(mesh.file, comm, mesh.dim, scale=mesh.scale, only=only, merge=merge, refine=refine)
     assert mesh.geometry is not None
     own = {"dim": float(mesh.dim)} if "dim" in outline(mesh.geometry).parameters else {}
-    return read_geo(geometry(mesh.geometry), comm, {**own, **mesh.set}, gdim=mesh.dim)
+    return read_geo(geometry(mesh.geometry), comm, {**own, **given}, gdim=mesh.dim)
+
+
+def _parameters(tables: CaseTables, document: Document) -> dict[str, float]:
+    """Parameters of the geometry, with the sizes that follow from the rule."""
+    mesh, insertion = tables.mesh, tables.insertion
+    given: dict[str, float | str] = dict(mesh.set)
+    if insertion is not None and mesh.geometry is not None:
+        known = ("size",) if mesh.geometry == LAMINATE else outline(mesh.geometry).parameters
+        by_rule = SIZES if insertion.notch == 0 else ALONG
+        given = {**{name: RULE for name in by_rule if name in known}, **given}
+    return {name: _by_rule(tables, document, ("mesh", "set", name), value) for name, value in given.items()}
+
+
+def _refinement(tables: CaseTables, document: Document) -> Refinement | None:
+    refine = tables.mesh.refine
+    if refine is None:
+        return None
+    size = _by_rule(tables, document, ("mesh", "refine", "size"), refine.size)
+    return Refinement(refine.groups, size, refine.growth)
+
+
+def _by_rule(tables: CaseTables, document: Document, key: Keys, value: float | str) -> float:
+    """A size, which may follow from the tools and the laws of the case."""
+    if not isinstance(value, str):
+        return value
+    tools = [shape for tool in tables.tools.values() if (shape := getattr(tool, "made", None)) is not None]
+    cut = [*(tables.law_of(crack) for crack in tables.cracks.values()), *map(tables.law_of, tables.layers)]
+    laws = [law for law in (tables.law, *cut) if law is not None]
+    if not tools or not laws:
+        raise refused(document, key, f"must be a number: {RULE!r} needs a tool with a shape and a cohesive law")
+    rule = MeshRule.of(tools, laws)
+    return rule.size if key[-1] in ALONG else rule.mouth

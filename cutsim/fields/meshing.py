@@ -18,6 +18,7 @@ from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import create_mesh
 from cutsim.base.signatures import checked
 from cutsim.fields.cells import check_cells
+from cutsim.fields.refinement import Refinement, refined
 from cutsim.readers import formats, gmsh_model
 from cutsim.readers.facets import rows_in
 from cutsim.readers.mesh_data import MeshData
@@ -170,6 +171,7 @@ def read_mesh(
     only: Sequence[str] | None = None,
     merge: Merge = False,
     tolerance: float | None = None,
+    refine: Refinement | None = None,
 ) -> TaggedMesh:
     """Read a mesh with groups from a file of gmsh, Abaqus, FEBio, VTK or of another format by its ending. Collective.
 
@@ -196,6 +198,7 @@ def read_mesh(
             of cells. ``A|B`` are the facets where they were merged. Where they are not, ``A|B`` are those of A that
             lie on B, and ``B|A`` those of B, such as for a `SurfacePair`.
         tolerance: Distance below which nodes lie on each other [length]; a thousandth of the shortest edge if None.
+        refine: Refinement of triangles or tetrahedra along some groups of facets; None for none.
 
     Raises:
         ValueError: On all ranks, with the line where the file has lines, if the file cannot be read, the cells are not
@@ -207,7 +210,7 @@ def read_mesh(
     require("only", only, only is None or (len(only) > 0 and not isinstance(only, str)), "names of groups, or None")
     pairs = isinstance(merge, bool) or all(len(pair) == 2 and not isinstance(pair, str) for pair in merge)
     require("merge", merge, pairs, "True, False, or pairs of names of groups")
-    return _read(path, comm, Choice(gdim, scale, only, merge, tolerance), lambda: formats.load(path, gdim))
+    return _read(path, comm, Choice(gdim, scale, only, merge, tolerance), lambda: formats.load(path, gdim), refine)
 
 
 @checked
@@ -251,8 +254,14 @@ def _tagged(mesh: Mesh, groups: Mapping[Group, NDArray[np.int32]]) -> TaggedMesh
     return TaggedMesh(mesh, found[0], found[1], numbers, groups)
 
 
-def _read(path: Path | str, comm: MPI.Comm, choice: Choice, load: Callable[[], MeshData]) -> TaggedMesh:
-    """Load a file on rank 0 and distribute its mesh."""
+def _read(
+    path: Path | str,
+    comm: MPI.Comm,
+    choice: Choice,
+    load: Callable[[], MeshData],
+    refine: Refinement | None = None,
+) -> TaggedMesh:
+    """Load a file on rank 0, refine its mesh and distribute it."""
     require("gdim", choice.gdim, choice.gdim in (2, 3), "2 or 3")
     model, problem = None, None
     if comm.rank == 0:
@@ -260,6 +269,7 @@ def _read(path: Path | str, comm: MPI.Comm, choice: Choice, load: Callable[[], M
             if not Path(path).is_file():
                 raise ValueError("no such file")
             model = make_model(load(), choice)
+            model = model if refine is None else refined(model, refine)
         except Exception as error:  # readers raise nothing narrower
             problem = str(error) or type(error).__name__
     problem = comm.bcast(problem)
