@@ -147,6 +147,10 @@ class Tool(Constructed):
         path: Motion of its reference point, as points at times, or as a feed with a sawing stroke, a slice or rocking.
         corners: Times at which its velocity jumps; those of `path` are known [time].
         contact: Contact law; by default a penalty of 10 E/h, and that of an inserted tool is its own.
+        allowed_penetration: If given, the contact is augmented until no facet penetrates more than this in the mean
+            [length].
+        allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
+            [length].
     """
 
     friction: Annotated[Friction, NONNEGATIVE] = 0.0
@@ -156,6 +160,8 @@ class Tool(Constructed):
     path: Motion | None = None
     corners: tuple[Time, ...] = ()
     contact: Contact | None = None
+    allowed_penetration: Annotated[Length, POSITIVE] | None = None
+    allowed_slip: Annotated[Length, POSITIVE] | None = None
 
     @property
     def pointed(self) -> bool:

@@ -60,7 +60,16 @@ def _shaped(
         friction = table.friction
         path = path_of(table)
         return ToolContact(
-            state, shape, path, surfaces, contact=contact, friction=friction, temperature=temperature, name=name
+            state,
+            shape,
+            path,
+            surfaces,
+            contact=contact,
+            friction=friction,
+            allowed_penetration=table.allowed_penetration,
+            allowed_slip=table.allowed_slip,
+            temperature=temperature,
+            name=name,
         )
 
 
@@ -72,7 +81,16 @@ def _triangulated(domain: Domain, solids: tuple[Solid, ...], name: str, table: s
         contact = table.contact or _contact(None, solids, [Surface.exterior(state, facets)])
         path = path_of(table)
         return TriangulatedTool(
-            state, facets, surface, path, contact=contact, friction=table.friction, search=table.search, name=name
+            state,
+            facets,
+            surface,
+            path,
+            contact=contact,
+            friction=table.friction,
+            allowed_penetration=table.allowed_penetration,
+            allowed_slip=table.allowed_slip,
+            search=table.search,
+            name=name,
         )
 
 

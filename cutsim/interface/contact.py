@@ -2,7 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
 import ufl
+from numpy.typing import NDArray
 
 from cutsim.base.checks import nonnegative, positive, require_number
 from cutsim.base.functions import positive_part
@@ -52,6 +54,12 @@ class PenaltyContact:
         return ufl.conditional(
             ufl.lt(s, 0), 0.0, ufl.conditional(ufl.lt(s, 2 * c), quadratic, self.stiffness * (s - c))
         )
+
+    def penetration(self, pressure: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Least penetration with a pressure ≥ 0, the inverse of `pressure` [length]."""
+        quadratic = np.sqrt(4 * self.blend * pressure / self.stiffness)
+        linear = pressure / self.stiffness + self.blend
+        return np.where(pressure < self.stiffness * self.blend, quadratic, np.where(pressure > 0, linear, 0.0))
 
     def energy(self, penetration: Expr) -> Expr:
         """Energy ∫ p dδ stored by the penalty [force/length]."""

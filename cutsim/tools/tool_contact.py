@@ -1,6 +1,7 @@
 """Contact of a rigid tool with outer surfaces and crack faces, with friction and reactions (docs/theory.md §4)."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -8,9 +9,10 @@ import ufl
 from dolfinx import fem
 
 from cutsim.base.assembly import integrate, moment, nodal_forces, resultant
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps, form
 from cutsim.base.kinematics import Expr, cofactor, tangential
+from cutsim.base.memory import Remembered
 from cutsim.base.parameters import with_constants
 from cutsim.base.signatures import checked
 from cutsim.base.verdict import Verdict
@@ -20,10 +22,28 @@ from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.multiplier import ContactMultiplier
 from cutsim.interface.slip import Rubbing, SlipHistory, check_friction, completed
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import Shape, ToolPath, check_directions, with_constant_directions
+
+
+@dataclass(frozen=True)
+class ToolLaws:
+    """Laws of the contact of a tool.
+
+    Args:
+        contact: Contact law.
+        friction: Friction law with a tangential penalty, None for none.
+        allowed_penetration: Largest mean penetration of a facet after augmentation [length]; None for no augmentation.
+        allowed_slip: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
+    """
+
+    contact: PenaltyContact
+    friction: FrictionLaw | None
+    allowed_penetration: float | None = None
+    allowed_slip: float | None = None
 
 
 class Patch:
@@ -35,8 +55,7 @@ class Patch:
         surface: The surface.
         shape: Signed distance of the tool.
         pose: Its present position and rotation.
-        contact: Contact law.
-        friction: Friction law with a tangential penalty, or None.
+        laws: Laws of the contact.
         temperature: Temperature of the body, for friction laws that depend on it.
 
     Attributes:
@@ -54,32 +73,40 @@ class Patch:
         surface: Surface,
         shape: Shape,
         pose: tuple[fem.Constant, fem.Constant],
-        contact: PenaltyContact,
-        friction: FrictionLaw | None,
+        laws: ToolLaws,
         temperature: Temperature | None,
     ) -> None:
-        self.surface = surface
+        self.surface, points = surface, surface.points
         position, self._rotation = pose
         moved = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
         self.place = ufl.transpose(self._rotation) * moved
         x, shape = ufl.variable(self.place), with_constant_directions(state.mesh, shape)
         normal = ufl.diff(shape.distance(x), x)
-        self._contact = with_constants(state.mesh, contact)
-        self._penetration = -shape.distance(self.place)
-        self.normal_size = surface.points.mean(normal_size(state.mesh, surface.points.facets))
-        self._pressure = self._contact.pressure(self._penetration)
+        self._contact = with_constants(state.mesh, laws.contact)
+        self._penetration = held = -shape.distance(self.place)
+        self.normal_size = points.mean(normal_size(state.mesh, points.facets))
+        self._multiplier: ContactMultiplier | None = None
+        if laws.allowed_penetration is not None:
+            allowed = laws.allowed_penetration
+            self._multiplier = ContactMultiplier(state.memory, name, points, laws.contact, allowed)
+            held = self._penetration + self._multiplier.shift
+        self._pressure = self._contact.pressure(held)
         self.thrust = -self._pressure * normal
         self._facing = ufl.dot(surface.restrict(_outward(state)), self._rotation * normal)
         self.slip: SlipHistory | None = None
-        if friction is not None:
+        if laws.friction is not None:
             rubbing = Rubbing(
                 self.place,  # it changes by the slip relative to the tool, which moves and turns
                 self._pressure,
-                self._penetration,
+                held,
                 project=lambda slip: tangential(slip, normal),
                 temperature=None if temperature is None else surface.restrict(temperature.value),
             )
-            self.slip = SlipHistory(state, name, surface.points, friction, rubbing)
+            self.slip = SlipHistory(state, name, points, laws.friction, rubbing, tolerance=laws.allowed_slip)
+        self._known: Remembered[dict[str, Values]] | None = None
+        if self._multiplier is not None:
+            start = {"work": np.zeros_like(points.weights), **self.contact()}
+            self._known = state.memory.value(f"{name}: contact", start, places=points.places)
 
     def virtual_work(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ (t − p ∇d)·v: pressure and friction as they act on the tool."""
@@ -89,6 +116,25 @@ class Patch:
     def energy(self) -> ufl.Form:
         """Energy of the contact penalty."""
         return self._contact.energy(self._penetration) * self.surface.measure
+
+    def evaluate(self) -> None:
+        """Slip of the trial state, and with a multiplier the work of the pressure on the penetration. Collective."""
+        if self.slip is not None:
+            self.slip.evaluate()
+        if self._known is not None:
+            now, old = self.contact(), self._known.committed
+            mean = 0.5 * (now["pressure"] + old["pressure"])
+            self._known.trial = {**now, "work": old["work"] + mean * (now["depth"] - old["depth"])}
+
+    def work(self) -> float | None:
+        """Work of the pressure on the penetration so far; None without multiplier [energy]. Collective."""
+        return None if self._known is None else self.surface.points.integral(self._known.trial["work"])
+
+    def augment(self) -> bool:
+        """Improve multiplier and carried friction; True if one was off by more than is allowed. Collective."""
+        now = self.contact()
+        pressed = self._multiplier is not None and self._multiplier.augment(now["pressure"], now["depth"])
+        return (self.slip is not None and self.slip.augment()) or pressed
 
     def penetration(self) -> float:
         """Largest depth of a point in the tool over the mesh size normal to the surface, < 0 outside. Collective."""
@@ -140,6 +186,10 @@ class ToolContact(RigidTool):
         contact: Contact law; the pressure acts per reference area.
         friction: Friction law against the slip relative to the tool, or the coefficient of Coulomb's, None for none;
             without a tangential penalty of its own it takes that of the contact law.
+        allowed_penetration: If given, the contact is augmented until the mean penetration of no facet that is pressed
+            as a whole is larger [length].
+        allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
+            [length].
         temperature: Temperature of the body, for friction laws that depend on it.
         name: Name in messages and output.
 
@@ -161,18 +211,22 @@ class ToolContact(RigidTool):
         *,
         contact: PenaltyContact,
         friction: FrictionLaw | float | None = None,
+        allowed_penetration: float | None = None,
+        allowed_slip: float | None = None,
         temperature: Temperature | None = None,
         name: str = "tool",
     ) -> None:
         check_friction("friction", friction)
+        require_number("allowed_penetration", allowed_penetration, positive.or_none)
+        require_number("allowed_slip", allowed_slip, positive.or_none)
         super().__init__(state, path, name)
         require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
         check_directions(shape, state.mesh.geometry.dim)
         self.shape, self.contact, self.friction = shape, contact, friction
         law = completed(friction, contact.stiffness) if friction else None
         self.symmetric = law is None
-        pose = self.position, self.rotation
-        self.patches = tuple(Patch(state, name, s, shape, pose, contact, law, temperature) for s in surfaces)
+        pose, laws = (self.position, self.rotation), ToolLaws(contact, law, allowed_penetration, allowed_slip)
+        self.patches = tuple(Patch(state, name, s, shape, pose, laws, temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
         self._passing = Passing(self, self.patches)
@@ -212,8 +266,13 @@ class ToolContact(RigidTool):
         arms = self.state.V.tabulate_dof_coordinates()[:nodes].copy()
         arms[:, :gdim] += self.state.u.x.array[: nodes * gdim].reshape(-1, gdim) - self.position.value
         self.act(resultant(comm, forces, gdim), moment(comm, forces, arms, gdim))
-        for slip in self.slips:
-            slip.evaluate()
+        for patch in self.patches:
+            patch.evaluate()
+
+    def augment(self) -> bool:
+        """Improve multipliers and carried friction; True if the step has to be solved again. Collective."""
+        # every patch takes part: a list, because any() would stop at the first
+        return any([patch.augment() for patch in self.patches])
 
     @property
     def blend(self) -> float:
@@ -225,8 +284,15 @@ class ToolContact(RigidTool):
         return max(p.penetration() for p in self.patches)
 
     def energies(self) -> dict[str, float]:
-        """Energy of the contact penalties and friction work so far. Collective."""
+        """Energy of the contact penalties and friction work so far. Collective.
+
+        What the pressure of a multiplier does beside the energy of the penalty is numerical; it vanishes with the
+        penetration.
+        """
         total = {"contact": integrate(self._energy_form), "friction": 0.0}
+        works = [work for patch in self.patches if (work := patch.work()) is not None]
+        if works:
+            total["numerical"] = sum(works) - total["contact"]
         for slip in self.slips:
             for entry, value in slip.energies().items():
                 total[entry] += value

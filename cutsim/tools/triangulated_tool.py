@@ -94,6 +94,10 @@ class TriangulatedTool(RigidTool):
         contact: Contact law; the pressure acts per reference area.
         friction: Friction law, or the coefficient of Coulomb's, None for none; without a tangential penalty of its own
             it takes that of the contact law.
+        allowed_penetration: If given, the contact is augmented until the mean penetration of no facet that is pressed
+            as a whole is larger [length].
+        allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
+            [length].
         search: Largest distance of a partner, on either side, beyond what has moved in the step [length]; by
             default the mean size of the facets.
         name: Name in messages and output.
@@ -114,13 +118,20 @@ class TriangulatedTool(RigidTool):
         *,
         contact: PenaltyContact,
         friction: FrictionLaw | float | None = None,
+        allowed_penetration: float | None = None,
+        allowed_slip: float | None = None,
         search: float | None = None,
         name: str = "tool",
     ) -> None:
         check_friction("friction", friction)
         super().__init__(state, path, name)
         gdim = state.mesh.geometry.dim
-        require_number("search", search, positive.or_none)
+        for key, length in {
+            "search": search,
+            "allowed_penetration": allowed_penetration,
+            "allowed_slip": allowed_slip,
+        }.items():
+            require_number(key, length, positive.or_none)
         require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
         face = Face.outer(state.mesh, facets)
         points = slave_points(state, face, "facets")
@@ -131,7 +142,7 @@ class TriangulatedTool(RigidTool):
         slave = SlaveSurface(state.V, face, points)
         kinematics = CurrentPartners(state.memory, name, slave, master, search=search or size, size=size)
         law = completed(friction, contact.stiffness) if friction else None
-        laws = PairLaws(None, contact, law, None, None)
+        laws = PairLaws(None, contact, law, allowed_penetration, allowed_slip)
         self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0)
 
     @property
@@ -152,6 +163,10 @@ class TriangulatedTool(RigidTool):
         """Move the tool; the slide of the step counts from the committed displacement."""
         super().begin()
         self.touch.begin()
+
+    def augment(self) -> bool:
+        """Improve multiplier and carried friction; True if the step has to be solved again. Collective."""
+        return self.touch.augment()
 
     def evaluate(self) -> None:
         """Trial history, force and moment of the step. Collective."""
