@@ -7,6 +7,7 @@ from math import isfinite
 import numpy as np
 from mpi4py import MPI
 
+from cutsim.analysis.availability import Availability
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.base.checks import positive, require, require_number
@@ -41,6 +42,7 @@ class ThermoMechanics:
         require_number("iterate", iterate, positive.or_none)
         self.mechanics, self.heat, self.iterate = mechanics, heat, iterate
         self.state = mechanics.state
+        self._availability = Availability(heat.temperature, heat.terms)
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -143,4 +145,5 @@ class ThermoMechanics:
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Columns of the history row: name → (value, kind of quantity). Collective."""
-        return self.mechanics.record() | self.heat.record()
+        total = self._availability.record(self.mechanics.trial_audit, self.heat.trial_audit)
+        return self.mechanics.record() | self.heat.record() | total

@@ -50,6 +50,9 @@ class Maxwell:
         strengths: gᵢ of the series.
         measure: Measure over the body.
         strain: Components of strain at the start, at which there is no overstress.
+
+    Attributes:
+        heat: What the dashpots dissipate in the trial step at each point, per reference volume.
     """
 
     def __init__(
@@ -57,7 +60,7 @@ class Maxwell:
     ) -> None:
         self._spring, self._strengths = spring, strengths
         # of energy, for sums over the body
-        self._density = fem.Function(spring.points.space())
+        self._density, self.heat = (fem.Function(spring.points.space()) for _ in range(2))
         self._integral = form(self._density * measure)
         rest = np.zeros((len(strengths), *strain.shape))
         relaxed = np.stack([spring.reduced(strain)] * len(strengths))
@@ -95,6 +98,7 @@ class Maxwell:
             start, cross, end = _weights(steps[i])
             first, last = old.ahead[i], ahead[i]
             lost = lost + (h_old * (start * first + cross * last) + h * (cross * first + end * last)).sum(-1)
+        self.heat.x.array[self._spring.points.dofs] = lost
         self._terms.trial = _Terms(overstress, relaxed, ahead, self._sum(stored), old.lost + self._sum(lost))
 
     def _sum(self, values: Array) -> float:

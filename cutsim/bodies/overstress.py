@@ -73,6 +73,10 @@ class Overstress(Contribution):
         """
         return F * (self._weight * self._stress(F) + self._known.mean)
 
+    def heat(self, w: Expr) -> ufl.Form:
+        """What the dashpots dissipate in the step."""
+        return w * self._energies.heat * self._formulation.measures[0]
+
     def begin(self) -> None:
         """Relax the overstresses over the step whose size the state knows."""
         decay, gain = self._factors = self._prony.factors(float(self._state.dt.value))

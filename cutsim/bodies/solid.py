@@ -171,6 +171,15 @@ class Solid(Term):
             entries[name] += value
         return entries
 
+    def heat(self, w: Expr) -> ufl.Form:
+        """Heat of the trial step times a function w: viscous dissipation, and the thermoelastic effect [energy]."""
+        return sum((c.heat(w) for c in self.contributions), start=ufl.Form([]))
+
+    @property
+    def bound_entropy(self) -> ufl.Form:
+        """Entropy −∂W/∂T of a strain energy that depends on temperature, as a form [energy/temperature]."""
+        return sum((c.bound_entropy() for c in self.contributions), start=ufl.Form([]))
+
     @property
     def viscous_work(self) -> float:
         """Work of the Kelvin–Voigt viscosity so far, in the trial state [energy]."""

@@ -88,6 +88,7 @@ def _bodies(domain: Domain, heat: schema.Heat, solids: Sequence[Solid], value: T
                 density=table.density,
                 body=solid,
                 source=table.source,
+                deformation=table.deformation,
                 name=solid.name,
             )
 

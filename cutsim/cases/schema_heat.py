@@ -16,7 +16,7 @@ from cutsim.base.units import (
 from cutsim.cases.constructed import FromTable
 from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyName, CrackName, Groups, PairName, ToolName
-from cutsim.cases.tables import FORM, NONNEGATIVE, POSITIVE, Table, Varying, chosen_by
+from cutsim.cases.tables import FORM, NONNEGATIVE, POSITIVE, Flag, Table, Varying, chosen_by
 from cutsim.heat.contact_heat import ContactHeat, HeatLaw
 
 Warmth = Annotated[TimeValue, Varying("temperature")]
@@ -30,6 +30,8 @@ class HeatBody(Table):
         conductivity: k ≥ 0, a number or a symmetric matrix [power/(length·temperature)].
         density: Mass per reference volume > 0; by default that of the body [mass/length³].
         source: Heat source per reference volume [power/volume].
+        deformation: Whether its deformation heats it: what viscosity and relaxation dissipate, and the thermoelastic
+            effect of a body that expands or softens with temperature.
     """
 
     capacity: Annotated[SpecificHeat, POSITIVE]
@@ -40,6 +42,7 @@ class HeatBody(Table):
     ]
     density: Annotated[Density, POSITIVE] | None = None
     source: Annotated[TimeValue, Varying("heat source")] = 0.0
+    deformation: Flag = False
 
 
 class Flux(Table):

@@ -7,7 +7,9 @@ from cutsim.base.terms import Term
 from cutsim.fields.temperature import Temperature
 
 #: Entries of the heat audit: where heat comes from, and what becomes of it.
-GAINED = ("friction", "fracture", "source", "inflow")
+GAINED = ("friction", "fracture", "deformation", "source", "inflow")
+#: What comes from the work of the mechanics.
+WORK = ("friction", "fracture", "deformation")
 SPENT = ("stored", "outflow")
 
 
@@ -26,14 +28,18 @@ class HeatTerm(Term):
         """Heat of the trial step by entry of the audit [energy]; a negative outflow is an inflow. Collective."""
         return {}
 
+    def held_entropy(self) -> float:
+        """Entropy that it holds, in the trial state [energy/temperature]. Collective."""
+        return 0.0
+
 
 @dataclass(frozen=True)
 class HeatAudit:
     """Audit of heat since the start of a run [energy].
 
     Attributes:
-        entries: Heat from friction, fracture and sources, heat that has come in through boundaries and tools; heat
-            stored in bodies and interfaces, and heat that has left through boundaries and tools.
+        entries: Heat from friction, fracture, deformation and sources, heat that has come in through boundaries and
+            tools; heat stored in bodies and interfaces, and heat that has left through boundaries and tools.
         scale: Reference of the relative closure: the largest turnover so far, and at least what the audit starts with.
     """
 

@@ -134,6 +134,12 @@ class HeatExchange:
             "stored": self.law.capacity * self._integral(rise) if self.law.capacity else 0.0,
         }
 
+    def held_entropy(self) -> float:
+        """Entropy of the heat capacity of the interface [energy/temperature]. Collective."""
+        if not self.law.capacity:
+            return 0.0
+        return self.law.capacity * self._integral(np.log(self.values["temperature"] - self._zero))
+
     def flow(self, side: str) -> float:
         """Heat flow out of a surface, side "plus" or "minus" [power]. Collective."""
         return self._integral(self.values[f"flux_{side}"])
@@ -186,6 +192,10 @@ class ExchangeTerm(HeatTerm):
         """Heat generated and stored by the interface in the step. Collective."""
         heats = [e.heat() for e in self.exchanges]
         return {entry: sum(heat[entry] for heat in heats) for entry in heats[0]}
+
+    def held_entropy(self) -> float:
+        """Entropy of the heat capacity of the interface. Collective."""
+        return sum(e.held_entropy() for e in self.exchanges)
 
     def flow(self, side: str) -> float:
         """Heat flow out of a surface, side "plus" or "minus" [power]. Collective."""
