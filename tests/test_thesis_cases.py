@@ -95,3 +95,21 @@ def test_a_bar_of_the_printed_solid_cannot_tear():
     assert 1.15 < largest < 1.18
     assert found["pull_force"].max() == pytest.approx(25 * largest, rel=0.02)
     assert found["pull_force"][-1] < 0.8 * found["pull_force"].max() and not found["crack_broken"].any()
+
+
+# -- bond, friction and heat between elastic bodies -------------------------------------------------------------------
+
+
+def test_a_block_is_sheared_off_and_slides_on():
+    """The bond spends its work of separation, friction is that of Coulomb, and all of it is heat in the bodies."""
+    found = rows("sheared-off", **{"steps.first": "0.2", "steps.largest": "0.2"})
+    assert found["energy_fracture"][-1] == pytest.approx(0.2 * 10, rel=1e-3)
+    assert found["drive_force"][-1] == pytest.approx(0.1 * found["press_force"][-1], rel=5e-3)
+    assert found["drive_force"].max() == pytest.approx(0.18 * 10, rel=0.02), "the bond is loaded nearly evenly"
+    assert found["energy_friction"][-1] > 0.3
+    given = found["energy_fracture"] + found["energy_friction"]
+    np.testing.assert_allclose(found["heat_stored"], given, rtol=1e-6, atol=1e-9)
+    warmed = sum(0.1 * area * (found[f"{body}_temperature"] - 273.15) for body, area in (("block", 25), ("slab", 100)))
+    np.testing.assert_allclose(warmed, given, rtol=1e-6, atol=1e-9)
+    assert np.diff(found["total_entropy"]).min() > -1e-12
+    np.testing.assert_allclose(found["total_energy"], found["work_external"], atol=0.01 * given[-1])
