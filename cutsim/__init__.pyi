@@ -1,9 +1,10 @@
 from .analysis.mechanics import Mechanics as Mechanics
 from .analysis.staggered import ThermoMechanics as ThermoMechanics
 from .analysis.stepping import StepControl as StepControl
-from .analysis.stepping import StepError as StepError
-from .analysis.stepping import StepReport as StepReport
 from .analysis.stepping import run as run
+from .analysis.steps import PathFollowing as PathFollowing
+from .analysis.steps import StepError as StepError
+from .analysis.steps import StepReport as StepReport
 from .bodies.body_force import BodyForce as BodyForce
 from .bodies.loads import NodalForce as NodalForce
 from .bodies.loads import Pressure as Pressure

@@ -1,6 +1,6 @@
 """Checkpoints: the committed state of a problem, from which another process can continue."""
 
-from cutsim.analysis.stepping import Problem
+from cutsim.analysis.steps import Problem
 from cutsim.base.memory import Snapshot
 from cutsim.base.signatures import checked
 

@@ -1,6 +1,6 @@
 """Balance of momentum of one step: the sum of the terms, and the energy audit."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
 from typing import Any, Literal
@@ -9,7 +9,9 @@ import numpy as np
 from dolfinx import cpp, la
 from numpy.typing import NDArray
 
+from cutsim.analysis.doubts import doubt_audit, doubt_way_back
 from cutsim.analysis.energy import EnergyAudit
+from cutsim.analysis.equilibrium_path import EquilibriumPath
 from cutsim.analysis.mobility import extent
 from cutsim.analysis.motion import Dynamic, Motion, QuasiStatic
 from cutsim.base.assembly import global_dot
@@ -33,7 +35,6 @@ from cutsim.base.terms import (
     offering,
     with_companions,
 )
-from cutsim.base.verdict import CLOSURE
 from cutsim.bodies.inertia import Inertia
 from cutsim.bodies.loads import Support
 from cutsim.bodies.schemes import TRAPEZOIDAL, Scheme
@@ -49,10 +50,6 @@ from cutsim.solvers.iterations import Outcome
 _RUNAWAY = 100.0
 # difference of two prescribed displacements over that size that is none
 _ROUNDING = 1e-12
-# growth of the turnover in a step from which on nothing is said aloud: the audit has just begun
-_BEGUN = 2.0
-#: What a viscosity may take of the energy that is lost.
-VISCOUS = 0.01
 #: Uzawa augmentations allowed in one step.
 AUGMENTATIONS = 30
 
@@ -176,12 +173,16 @@ class Mechanics(Balance[Term, Support]):
         Args:
             line_search: "l2", "bt" or "basic"; the solver's default if None.
         """
-        outcome = super().solve(line_search)
+        return self._settle(lambda: super(Mechanics, self).solve(line_search))
+
+    def _settle(self, solve: Callable[[], Outcome]) -> Outcome:
+        """Outcome of a solve and of those after augmentations, to which no term objects. Collective."""
+        outcome = solve()
         for _ in range(AUGMENTATIONS):
             # every term takes part: a list, because any() would stop at the first
             if not outcome.converged or not any([t.augment() for t in offering(self.terms, Augmenting)]):
                 break
-            outcome = super().solve(line_search).after(outcome)
+            outcome = solve().after(outcome)
         else:
             message = f"contact not settled by {AUGMENTATIONS} augmentations"
             outcome = replace(outcome, converged=False, message=message)
@@ -207,6 +208,14 @@ class Mechanics(Balance[Term, Support]):
         self._residual.trial, self._rate_forces.trial, self._moved.trial = residual, rate_forces, True
         self._audit.trial = self.audit.advance(work, self._energies())
 
+    @property
+    def path(self) -> EquilibriumPath:
+        """The path of its equilibria."""
+        return EquilibriumPath(self, self._settle, self._lost)
+
+    def _lost(self) -> float:
+        return self.trial_audit.entries["fracture"] - self.audit.entries["fracture"]
+
     def _energies(self) -> list[dict[str, float]]:
         return [t.energies() for t in offering(self.terms, Energetic)]
 
@@ -227,22 +236,9 @@ class Mechanics(Balance[Term, Support]):
     def watch(self) -> None:
         """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
         super().watch()
-        self._watch_audit()
-
-    def _watch_audit(self) -> None:
-        """Doubt an audit that does not close, and a viscosity that takes part in what is lost."""
-        verdict, audit, entries = self.state.verdict, self.trial_audit, self.trial_audit.entries
-        verdict.withdraw("closure")
-        if audit.worst_closure > CLOSURE:
-            words = f"{audit.worst_closure:.1%} of the energy is missing in the audit: smaller steps are needed"
-            verdict.suppose("closure", words, aloud=audit.scale < _BEGUN * self.audit.scale)
-        lost = entries["fracture"] + entries["friction"]
         viscous = sum((t.viscous_work for t in offering(self.terms, Regularised)), start=0.0)
-        verdict.withdraw("viscosity")
-        if lost > 0 and viscous > VISCOUS * (lost + viscous):
-            # before anything breaks it is all of it: what counts is how much it is in the end
-            share = viscous / (lost + viscous)
-            verdict.suppose("viscosity", f"the viscosity takes {share:.1%} of the energy that is lost")
+        doubt_audit(self.state.verdict, self.audit, self.trial_audit, viscous)
+        doubt_way_back(self.state, self.audit, self.trial_audit)
 
     def reaction(self, held: Support) -> float:
         """Reaction of a support along its direction in the trial state [force]. Collective."""

@@ -45,6 +45,10 @@ class ThermoMechanics:
         self._availability = Availability(heat.temperature, heat.terms)
 
     @property
+    def path(self) -> None:
+        """None: heat needs time to go on."""
+
+    @property
     def terms(self) -> tuple[Term, ...]:
         """Terms of both problems."""
         return (*self.mechanics.terms, *self.heat.terms)

@@ -5,24 +5,34 @@ history → accept or reject → commit, record.
 """
 
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from math import isfinite
+from dataclasses import dataclass, replace
 from types import FrameType
-from typing import Literal, Protocol
+from typing import Literal
 
 from mpi4py import MPI
 
+from cutsim.analysis.following import follow, followable, pace_after
+from cutsim.analysis.steps import (
+    FOLLOWING,
+    Control,
+    PathFollowing,
+    Problem,
+    StepError,
+    StepReport,
+    begin,
+    drift,
+    failure,
+    reported,
+)
 from cutsim.base.checks import above, at_least, between, count, positive, require, require_number
-from cutsim.base.kinematics import Expr
 from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked
-from cutsim.base.terms import Term
 from cutsim.base.units import Time
 from cutsim.base.verdict import INTERRUPTED
-from cutsim.fields.state import Pace, State
-from cutsim.solvers.iterations import LINE_SEARCHES, Outcome
+from cutsim.fields.state import Pace
+from cutsim.solvers.iterations import LINE_SEARCHES
 
 logger = collective_logger(__name__)
 
@@ -34,145 +44,6 @@ _STRAYED = 1e-3
 _ROUNDING = 1e-6
 # what the verdict says of a run that has not come to its end, until it goes on
 _ENDS = (INTERRUPTED, "ended")
-
-
-class Audit(Protocol):
-    """Protocol of an audit of a conserved quantity."""
-
-    @property
-    def scale(self) -> float:
-        """The largest turnover so far, to which the closure is relative."""
-
-    @property
-    def gap(self) -> float:
-        """What is missing."""
-
-    @property
-    def closure(self) -> float:
-        """What is missing, relative to the largest turnover so far [–]."""
-
-
-class Problem(Protocol):
-    """Protocol of what `run` can step: `Mechanics`, `HeatTransfer`, or both as `ThermoMechanics`.
-
-    Attributes:
-        state: Displacement and time.
-    """
-
-    state: State
-
-    @property
-    def terms(self) -> Sequence[Term]:
-        """Its terms."""
-
-    @property
-    def fields(self) -> Mapping[str, Expr]:
-        """Fields beside the displacement for output, by name."""
-
-    @property
-    def corners(self) -> tuple[float, ...]:
-        """Times that steps have to meet exactly."""
-
-    @property
-    def audit(self) -> Audit:
-        """Audit of the committed state."""
-
-    @property
-    def trial_audit(self) -> Audit:
-        """Audit including the trial step."""
-
-    def refresh(self) -> None:
-        """Forget what solvers have factorised. Collective."""
-
-    def check(self) -> None:
-        """Refuse, before anything is solved, what has no solution. Collective."""
-
-    def advise(self) -> str:
-        """What may be tried where no step succeeds, in words; empty if nothing is known."""
-
-    def start(self, end: float) -> None:
-        """Take over the committed state, if no step has begun yet; the first one ends at `end`. Collective."""
-
-    def begin(self) -> None:
-        """Start the trial step that the state has begun. Collective."""
-
-    def predict(self) -> None:
-        """Start the search for the trial state from where the last step leads."""
-
-    def solve(self, line_search: str | None = None) -> Outcome:
-        """Solve the trial step. Collective."""
-
-    def evaluate(self) -> None:
-        """Trial history and audit of the solved step. Collective."""
-
-    def damage_increment(self) -> float:
-        """Largest growth of damage at a point in the trial step. Collective."""
-
-    def watch(self) -> None:
-        """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
-
-    def diagnose(self) -> str:
-        """After a failed solve: what is wrong and where, in words. Collective."""
-
-    def record(self) -> dict[str, tuple[float, str]]:
-        """Columns of the history row: name → (value, kind of quantity). Collective."""
-
-
-class StepError(RuntimeError):
-    """Raised when no step of the smallest allowed size succeeds; the recorded history stays readable."""
-
-
-@dataclass(frozen=True)
-class StepReport:
-    """Report of a step that was tried.
-
-    Attributes:
-        number: Its number: steps accepted so far, this one included.
-        time: Time at its end [time].
-        dt: Its size [time].
-        outcome: What the solver did.
-        damage: Largest growth of damage at a point [–].
-        drift: What the energy audit misses by it, over the largest turnover so far [–].
-        refusal: Why it is not accepted, in words; None if it is.
-        cuts: Attempts that were rejected since the last accepted step.
-        corner: Whether it ends at a corner of a path or load, or at the end of the run.
-        interrupted: Whether a signal ended the run after it.
-        columns: History columns, name → (value, kind of quantity).
-    """
-
-    number: int
-    time: float
-    dt: float
-    outcome: Outcome
-    damage: float = 0.0
-    drift: float = 0.0
-    refusal: str | None = None
-    cuts: int = 0
-    corner: bool = False
-    interrupted: bool = False
-    columns: dict[str, tuple[float, str]] = field(default_factory=dict)
-
-
-class Control(Protocol):
-    """Protocol of a step control: the sizes of the steps, and which are accepted; see docs/adding_a_step_control.md."""
-
-    @property
-    def first(self) -> float:
-        """First step [time]."""
-
-    @property
-    def smallest(self) -> float:
-        """Step below which the run gives up [time]."""
-
-    @property
-    def line_searches(self) -> tuple[str, ...]:
-        """Line searches tried in turn for the same step."""
-
-    def accept(self, report: StepReport) -> str | None:
-        """Why a step that was solved is not accepted, in words; None if it is."""
-
-    def next(self, report: StepReport) -> float:
-        """Size of the next step, after one that was accepted or not [time]."""
 
 
 @checked
@@ -191,6 +62,7 @@ class StepControl:
         closure: Largest part of the turnover that the energy audit may miss by a step; None for no limit.
         line_searches: Line searches tried in turn for the same step. For tools the default is best; for cracks in
             stiff, slender bodies ("basic", "l2", "bt").
+        path: How the equilibrium path is followed where no step in time succeeds.
 
     Raises:
         ValueError: A value is outside its range.
@@ -205,6 +77,7 @@ class StepControl:
     damage: float | None = None
     closure: float | None = None
     line_searches: tuple[str, ...] = ("bt", "l2")
+    path: PathFollowing = FOLLOWING
 
     def __post_init__(self) -> None:
         require_number("first", self.first, positive)
@@ -320,32 +193,47 @@ def run(
 
 
 def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
-    """One accepted step that does not pass the corner; its first try may be predicted."""
-    state, cuts = problem.state, 0
+    """One accepted step that does not pass the corner: in time, or along the path where that fails."""
+    state = problem.state
     pace = state.pace.committed
-    size = pace.size
+    followed = bool(pace.path)
+    if followed and (along := follow(problem, control, corner)) is not None:
+        return _accept(problem, along, pace_after(problem, control, along))
+    size, cuts = pace.size, 0
     while True:
         start = state.time_old
         end = corner if start + (1 + _SLIVER) * size >= corner else start + size
-        report = replace(_attempt(problem, control, end, predict=pace.smooth and not cuts), cuts=cuts)
-        if report.refusal is None:
-            return _accept(problem, control, replace(report, corner=end == corner), size)
+        tried = replace(_attempt(problem, control, end, predict=pace.smooth and not cuts), cuts=cuts)
+        if tried.refusal is None:
+            return _accept_in_time(problem, control, replace(tried, corner=end == corner), size)
         state.rollback()
-        size, cuts = control.next(report), cuts + 1
-        require("control.next(report)", size, size < report.dt, f"less than {report.dt:.6g} after a rejected step")
-        logger.info("step to %.6g rejected (%s); next try %.3g", end, report.refusal, size)
+        size, cuts = control.next(tried), cuts + 1
+        require("control.next(report)", size, size < tried.dt, f"less than {tried.dt:.6g} after a rejected step")
+        logger.info("step to %.6g rejected (%s); next try %.3g", end, tried.refusal, size)
+        if not followed and (_limit(problem, control) or size < control.smallest):
+            followed = True
+            if (along := follow(problem, control, corner)) is not None:
+                logger.info("from time %.6g the equilibrium path is followed", start)
+                return _accept(problem, replace(along, cuts=cuts + along.cuts), pace_after(problem, control, along))
         if size < control.smallest:
-            raise _no_step(problem, control, report)
+            raise _no_step(problem, control, tried)
 
 
-def _accept(problem: Problem, control: Control, report: StepReport, size: float) -> StepReport:
-    """Commit a step; the next one follows the size that was asked for, not what was left before a corner."""
+def _accept_in_time(problem: Problem, control: Control, report: StepReport, size: float) -> StepReport:
+    """Commit a step in time; the next one follows the size that was asked for, not what was left before a corner."""
     state, start = problem.state, report.time - report.dt
     if report.cuts and control.next(replace(report, refusal="")) < control.smallest:
         state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
-    problem.watch()
     following = control.next(replace(report, dt=size))
-    state.pace.trial = Pace(repr(control), following, smooth=not report.corner and not report.cuts)
+    smooth, turned = not report.corner and not report.cuts, state.pace.committed.turned
+    return _accept(problem, report, Pace(repr(control), following, smooth=smooth, turned=turned))
+
+
+def _accept(problem: Problem, report: StepReport, pace: Pace) -> StepReport:
+    """Commit a step."""
+    state = problem.state
+    problem.watch()
+    state.pace.trial = pace
     state.commit()
     return replace(report, columns=problem.record())
 
@@ -370,41 +258,31 @@ def _attempt(problem: Problem, control: Control, end: float, *, predict: bool) -
         if predicted:
             problem.predict()
         outcome = problem.solve(line_search)
-        failure = _failure(problem, outcome)
-        if predicted and failure is None and _drift(problem) > _STRAYED:
-            failure = "the start from the last step's rate leads to another equilibrium"
-        if failure is None:
+        refusal = failure(problem, outcome)
+        if predicted and refusal is None and drift(problem) > _STRAYED:
+            refusal = "the start from the last step's rate leads to another equilibrium"
+        if refusal is None:
             break
-    report = StepReport(state.number, end, end - state.time_old, outcome, refusal=failure)
-    if failure is not None:
-        return report
-    report = replace(report, damage=problem.damage_increment(), drift=_drift(problem))
-    return replace(report, refusal=control.accept(report))
+    tried = reported(problem, outcome, refusal)
+    if refusal is None:
+        tried = replace(tried, refusal=control.accept(tried) or _jump(problem, control, tried))
+    return tried
 
 
-def begin(problem: Problem, end: float) -> None:
-    """Start a trial step that ends at a time: the only place where the clock is moved. Collective."""
-    problem.start(end)
-    problem.state.begin(end)
-    problem.begin()
+def _limit(problem: Problem, control: Control) -> float:
+    """Largest loss of a step in time, beyond which the path is followed; 0 for no limit [energy]. Collective."""
+    found = followable(problem, control)
+    if found is None:
+        return 0.0
+    path, following = found
+    facets = following.onset or (following.facets if problem.state.pace.committed.turned else 0.0)
+    return facets * path.unit
 
 
-def _drift(problem: Problem) -> float:
-    """What the energy audit misses by the trial step, over the largest turnover; nothing while there was none."""
-    before, after = problem.audit, problem.trial_audit
-    return abs(after.gap - before.gap) / after.scale if before.scale > 0 else 0.0
-
-
-def _failure(problem: Problem, outcome: Outcome) -> str | None:
-    """Why a solve did not give an admissible state, in words; None if it did, and then the state is evaluated."""
-    if outcome.converged:
-        problem.evaluate()
-        # forces can balance around an inverted element, but then its energy has no value
-        if isfinite(problem.trial_audit.closure):
-            return None
-    why = "no admissible equilibrium" if outcome.converged else outcome.message
-    where = problem.diagnose()
-    return f"{why} after {outcome.iterations} iterations" + (f"; {where}" if where else "")
+def _jump(problem: Problem, control: Control, report: StepReport) -> str | None:
+    """Why a step in time has jumped over a turn of the path, in words, or None."""
+    limit = _limit(problem, control)
+    return f"it loses {report.lost:.3g}, more than {limit:.3g}" if limit and report.lost > limit else None
 
 
 @contextmanager

@@ -89,6 +89,11 @@ class Term:
         """Times the stepping has to meet exactly."""
         return ()
 
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether the forces depend on how long a step takes, apart from `State.dt` in the form, which tells itself."""
+        return False
+
     def begin(self) -> None:
         """Move constants to their value at the end of the step that the state has begun. Collective."""
 
@@ -162,6 +167,20 @@ class Damaging(Protocol):
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step [–]. Collective."""
+
+
+@runtime_checkable
+class Dissipating(Protocol):
+    """A term that loses energy as it breaks, by which an equilibrium path is followed."""
+
+    def path_measure(self) -> tuple[float, NDArray[np.float64]]:
+        """How far the step has come along the path, and the derivative of this. Collective.
+
+        Returns:
+            Energy that is lost from the start of the step to the present displacement [energy]: to first order, zero
+            while nothing breaks, and growing with the displacement where something does. Its derivative: owned entries
+            of the space of the displacement [force].
+        """
 
 
 @runtime_checkable

@@ -38,6 +38,11 @@ class Contribution:
     def begin(self) -> None:
         """Move constants to their values in the step whose size the state knows."""
 
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether its stresses depend on how long a step takes, apart from `State.dt` in their form."""
+        return False
+
     def evaluate(self) -> None:
         """Compute trial history and energies from the converged trial displacement. Collective."""
 

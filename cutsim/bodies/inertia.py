@@ -153,6 +153,11 @@ class Inertia(Term):
         """The velocity."""
         return {"velocity": self.velocity}
 
+    @property
+    def rate_dependent(self) -> bool:
+        """Always."""
+        return True
+
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ c ρ a(u)·v of the inertia forces."""
         return self.mass.form(self._weight * (self.state.u - self._predicted), v)

@@ -84,6 +84,11 @@ class Overstress(Contribution):
         self._weight.value = gain.sum()
         self._known.set(np.tensordot(decay, overstress, 1) - gain.sum() * stress)
 
+    @property
+    def rate_dependent(self) -> bool:
+        """Always."""
+        return True
+
     def evaluate(self) -> None:
         """Overstresses at the end of the step, and their energies. Collective."""
         strain, stress = self._evaluate()

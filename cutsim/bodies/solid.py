@@ -152,6 +152,11 @@ class Solid(Term):
         for part in self.contributions:
             part.begin()
 
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether overstresses relax."""
+        return any(c.rate_dependent for c in self.contributions)
+
     def evaluate(self) -> None:
         """Add the viscous dissipation of the step, and what the change of temperature adds. Collective."""
         for part in self.contributions:

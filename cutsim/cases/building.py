@@ -11,7 +11,8 @@ from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.staggered import ThermoMechanics
-from cutsim.analysis.stepping import Control, Recorder, run
+from cutsim.analysis.stepping import Recorder, run
+from cutsim.analysis.steps import Control
 from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Columns
 from cutsim.base.units import Units

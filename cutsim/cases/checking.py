@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
-from cutsim.analysis.stepping import begin
+from cutsim.analysis.steps import begin
 from cutsim.cases.building import Simulation
 from cutsim.cases.sizes import element_sizes, kind_of_cells
 from cutsim.fields.sizes import facet_size

@@ -6,7 +6,7 @@ from dataclasses import is_dataclass
 from functools import cache
 
 import cutsim
-from cutsim.analysis.stepping import Control
+from cutsim.analysis.steps import Control
 from cutsim.bodies.schemes import Scheme
 from cutsim.heat.contact_heat import HeatLaw
 from cutsim.interface.cohesive import CohesiveLaw

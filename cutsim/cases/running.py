@@ -15,7 +15,8 @@ import numpy as np
 from mpi4py import MPI
 
 import cutsim
-from cutsim.analysis.stepping import Interrupted, StepError, StepReport
+from cutsim.analysis.stepping import Interrupted
+from cutsim.analysis.steps import StepError, StepReport
 from cutsim.base.files import replace_file
 from cutsim.base.versions import mpi_version, petsc_version
 from cutsim.cases.building import Simulation

@@ -7,7 +7,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from pydantic_core import CoreSchema
 
-from cutsim.analysis.stepping import Control, StepControl
+from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.steps import Control
 from cutsim.base.checks import positive, require_number
 from cutsim.base.units import Length, Number, Time
 from cutsim.bodies.schemes import Newmark, Scheme

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from cutsim.analysis.stepping import StepReport
+    from cutsim.analysis.steps import StepReport
     from cutsim.cases import Case
     from cutsim.commands.folders import Source
     from cutsim.identify import Fit

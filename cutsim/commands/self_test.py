@@ -11,7 +11,8 @@ import json
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl, StepReport, run
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.analysis.steps import StepReport
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import geometry, read_geo

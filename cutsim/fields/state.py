@@ -29,12 +29,14 @@ class Clock:
         dt: Its size [time].
         rate: Velocity of the displacement in it, local entries, ghosts included [length/time].
         number: Its number, 0 before the first.
+        back: All the time that steps so far went back [time].
     """
 
     time: float
     dt: float
     rate: NDArray[np.float64]
     number: int = 0
+    back: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,15 @@ class Pace:
         control: The control that has chosen the size, in words.
         size: The size [time].
         smooth: Whether the last step tells where the next one leads.
+        path: Size of the next step along the equilibrium path, 0 for a step in time [energy].
+        turned: Whether the path had to be followed before.
     """
 
     control: str = ""
     size: float = 0.0
     smooth: bool = False
+    path: float = 0.0
+    turned: bool = False
 
 
 class State:
@@ -110,6 +116,11 @@ class State:
         return self._clock.committed.time
 
     @property
+    def path(self) -> float:
+        """Path variable: the time, and twice the time that steps went back, so that it never falls (trial) [time]."""
+        return self._clock.trial.time + 2 * self._clock.trial.back
+
+    @property
     def number(self) -> int:
         """Number of the step (trial)."""
         return self._clock.trial.number
@@ -117,7 +128,8 @@ class State:
     def begin(self, time: float) -> None:
         """Start a step that ends at `time`; the trial displacement starts from the committed one."""
         old = self._clock.committed
-        self._clock.trial = replace(old, time=time, dt=time - old.time, number=old.number + 1)
+        back = old.back + max(old.time - time, 0.0)
+        self._clock.trial = replace(old, time=time, dt=time - old.time, number=old.number + 1, back=back)
         self.dt.value = self._clock.trial.dt
 
     def predict(self) -> None:

@@ -80,6 +80,10 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
         self._audit = self.state.memory.value("heat: audit", HeatAudit(scale=scale))
 
     @property
+    def path(self) -> None:
+        """None: heat needs time to go on."""
+
+    @property
     def fields(self) -> Mapping[str, Expr]:
         """Fields of the solution for output, by name."""
         return {"temperature": self.temperature.value}

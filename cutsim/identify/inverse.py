@@ -19,7 +19,7 @@ from mpi4py import MPI
 from numpy.typing import ArrayLike, NDArray
 from scipy import optimize
 
-from cutsim.analysis.stepping import StepError
+from cutsim.analysis.steps import StepError
 from cutsim.base.checks import between, count, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.identify.fitting import Bounds, Fit, Parameters, finished, limits_of, require_pairs, require_problem

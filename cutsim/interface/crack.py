@@ -6,6 +6,7 @@ face: T·n > 0 pulls them together.
 """
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -32,6 +33,7 @@ from cutsim.interface.crack_viscosity import CrackViscosity
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
+from cutsim.interface.path_measure import PathMeasure
 from cutsim.interface.slip import check_friction
 from cutsim.interface.viscous import ViscousBond
 
@@ -177,6 +179,14 @@ class Crack(Term):
             return False
         pressure = self.faces.values(1.0)["pressure"]
         return self.history.augment(pressure, self.contact.stiffness * self._allowed_penetration)
+
+    @cached_property
+    def _path_measure(self) -> PathMeasure:
+        return PathMeasure(self.state, self.points, self.faces, self.history)
+
+    def path_measure(self) -> tuple[float, NDArray[np.float64]]:
+        """Energy that the bond loses in the step [energy], and its derivative, owned entries [force]. Collective."""
+        return (0.0, np.zeros(len(self.state.increment))) if self.law is None else self._path_measure()
 
     def energies(self) -> dict[str, float]:
         """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""

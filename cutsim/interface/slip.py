@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import ufl
+from ufl.algorithms.analysis import extract_constants
 
 from cutsim.base.checks import nonnegative, require_number
 from cutsim.base.functions import positive_part
@@ -112,6 +113,7 @@ class SlipHistory:
         tolerance: float | None = None,
     ) -> None:
         self.points, self._tolerance, self._compliance = points, tolerance, law.compliance
+        self._dt = state.dt
         # augmentation leaves no elastic slip that energy is stored in
         self._elastic = law.compliance if tolerance is None else 0.0
         symbolic: FrictionLaw = with_constants(state.mesh, law)
@@ -143,6 +145,11 @@ class SlipHistory:
             f"{name}: slip", values, lambda known: self._start_from(known["traction"]), places=points.places
         )
         self._start_from(values["traction"])
+
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether the traction depends on how long a step takes."""
+        return any(constant is self._dt for t in self.traction for constant in extract_constants(t))
 
     def evaluate(self) -> None:
         """Slip, dissipation and stored energy of the trial step. Collective.

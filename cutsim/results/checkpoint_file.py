@@ -19,7 +19,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.analysis.checkpoint import load, save
-from cutsim.analysis.stepping import Problem
+from cutsim.analysis.steps import Problem
 from cutsim.base.files import replace_file
 from cutsim.base.memory import Snapshot
 from cutsim.base.packing import pack, unpack

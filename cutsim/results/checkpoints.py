@@ -8,7 +8,8 @@ from typing import Any, Self
 
 from mpi4py import MPI
 
-from cutsim.analysis.stepping import Interrupted, Problem, StepError, StepReport
+from cutsim.analysis.stepping import Interrupted
+from cutsim.analysis.steps import Problem, StepError, StepReport
 from cutsim.base.checks import nonnegative, require_number
 from cutsim.base.log import collective_logger
 from cutsim.base.signatures import checked

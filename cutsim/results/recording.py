@@ -12,7 +12,7 @@ from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from cutsim.analysis.stepping import Problem, StepReport
+from cutsim.analysis.steps import Problem, StepReport
 from cutsim.base.checks import above, count, require, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
@@ -121,7 +121,9 @@ class Recording:
 
     def __call__(self, report: StepReport) -> None:
         """Record an accepted step. Collective."""
+        path = self.problem.state.path
         columns: Columns = {"step": (float(report.number), "one"), "time": (report.time, "time")}
+        columns["path"] = (path, "time")
         columns |= report.columns | self._extra(report.columns)
         columns["newton"] = (float(report.outcome.iterations), "one")
         columns["krylov"] = (float(report.outcome.linear_iterations), "one")
@@ -141,9 +143,9 @@ class Recording:
         shown = {label: row[column] for label, column in self._show.items()}
         self._progress.update(report.time, step=report.number, **shown, iterations=report.outcome.iterations)
         written = self._written.committed
-        self._written.set(replace(written, rows=written.rows + 1, pending=report.time))
+        self._written.set(replace(written, rows=written.rows + 1, pending=path))
         if self._fields is not None and report.number % self._fields.every == 0:
-            self.write_fields(report.time)
+            self.write_fields(path)
         if self._checkpoints is not None and self._checkpoints.due():
             self._save(self._checkpoints)
 

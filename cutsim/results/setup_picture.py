@@ -15,7 +15,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cutsim.analysis.stepping import Problem
+from cutsim.analysis.steps import Problem
 from cutsim.base.arrays import Array
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Bonded, Joining, offering

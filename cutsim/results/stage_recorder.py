@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cutsim.analysis.stepping import Problem, StepReport
+from cutsim.analysis.steps import Problem, StepReport
 from cutsim.base.checks import count, finite, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Bonded, FacetShowing, offering

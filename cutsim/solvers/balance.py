@@ -17,6 +17,7 @@ from cutsim.fields.state import State
 from cutsim.solvers.directions import Directions, Guided
 from cutsim.solvers.iterations import Outcome
 from cutsim.solvers.newton import Kept, NonlinearProblem
+from cutsim.solvers.path import PathStep
 from cutsim.solvers.system import Structure
 
 
@@ -140,6 +141,12 @@ class Balance(Generic[T, H]):
         """
         outcome = self.problem.solve(line_search)
         # a solver that has failed is of no use to the next try either
+        self._kept.set(self.problem.kept)
+        return outcome
+
+    def solve_path(self, step: PathStep) -> Outcome:
+        """Find the unknown, and the time, at the end of a step along the path. Collective."""
+        outcome = self.problem.solve_path(step)
         self._kept.set(self.problem.kept)
         return outcome
 

@@ -76,11 +76,13 @@ class Iterations:
     Attributes:
         snes: The PETSc solver.
         linear: Its linear solver.
+        judge: Judge of the iterates.
+        measures: Norms of the iterates.
     """
 
     def __init__(self, system: System, criteria: Criteria, options: Options) -> None:
         self._system, self._options = system, options
-        self._measures = Norms(system)
+        self.measures = Norms(system)
         # the vector is not that of u, which line searches would spoil as their own start
         self._x = PETSc.Vec().createWithArray(system.unknowns, comm=system.comm)
         self._f = self._x.duplicate()
@@ -97,7 +99,7 @@ class Iterations:
         self.snes.setFromOptions()
         rtol, _, _, self._max_it = self.snes.getTolerances()
         tolerances = replace(criteria.tolerances, rtol=rtol)
-        self._judge = Judge(replace(criteria, tolerances=tolerances), system.cell_size())
+        self.judge = Judge(replace(criteria, tolerances=tolerances), system.cell_size())
 
     def _set_matrix(self) -> None:
         self.snes.setJacobian(weakly(self._evaluate_tangent), self._system.matrix())
@@ -115,7 +117,7 @@ class Iterations:
     @property
     def force(self) -> float:
         """Force scale of the last iterate [force]."""
-        return self._judge.force
+        return self.judge.force
 
     def run(self, force: float) -> Outcome:
         """Iterate from the present unknowns to equilibrium or failure, which leaves the last iterate.
@@ -126,8 +128,8 @@ class Iterations:
         x = self._system.unknowns
         self._x.array[:] = x
         self._system.forces.prescribe()
-        self._measures.start(x)
-        judge = self._judge
+        self.measures.start(x)
+        judge = self.judge
         judge.start(force, patient=self.line_search != "bt")
         iterations, linear = self._iterate()
         self._system.assign(self._x.array_r)
@@ -158,6 +160,10 @@ class Iterations:
             if reason != _SNES.DIVERGED_LINEAR_SOLVE or not self.linear.improve():
                 return iterations, linear
 
+    def vectors(self) -> tuple[PETSc.Vec, PETSc.Vec]:
+        """Two new vectors of the owned unknowns; the caller owns them."""
+        return self._x.duplicate(), self._x.duplicate()
+
     def renew_tangent(self) -> None:
         """Make the matrix anew if the sparsity pattern has changed."""
         if self._system.tangent.outdated:
@@ -174,7 +180,7 @@ class Iterations:
 
     def _evaluate_residual(self, snes: PETSc.SNES, x: PETSc.Vec, b: PETSc.Vec) -> None:
         """Called by SNES."""
-        b.array[:] = self._system.residual(x.array_r, BC_ROUNDING * self._judge.length)
+        b.array[:] = self._system.residual(x.array_r, BC_ROUNDING * self.judge.length)
 
     def _evaluate_tangent(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Called by SNES."""
@@ -185,14 +191,14 @@ class Iterations:
         # the linear solver meets these rows within its tolerance only, and what is left would be lifted again
         forces = self._system.forces
         y.array[forces.held] = forces.violation(x.array_r)
-        self._measures.note_direction(y.array_r, self.snes.getFunction()[0].array_r)
+        self.measures.note_direction(y.array_r, self.snes.getFunction()[0].array_r)
         self.linear.observe()
         return True
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
         """Called by SNES, whose iterations begin anew after a pause."""
-        iterate = self._measures.of(snes.getSolution().array_r, snes.getFunction()[0].array_r)
-        reason = self._judge.judge(iteration, iterate)
+        iterate = self.measures.of(snes.getSolution().array_r, snes.getFunction()[0].array_r)
+        reason = self.judge.judge(iteration, iterate)
         pause = reason is Reason.GOING_ON and self._system.tangent.outdated
         return _PAUSE if pause else _CODES[reason]
 

@@ -18,6 +18,7 @@ from cutsim.solvers.convergence import CRITERIA, Criteria
 from cutsim.solvers.directions import Directions
 from cutsim.solvers.iterations import LINE_SEARCHES, Iterations, Outcome
 from cutsim.solvers.lifetime import free_dropped
+from cutsim.solvers.path import PathIterations, PathStep
 from cutsim.solvers.preconditioners import LaggedPC
 from cutsim.solvers.system import STRUCTURE, Structure, System
 
@@ -86,12 +87,14 @@ class NonlinearProblem:
     ) -> None:
         self._options = Options(petsc_options_prefix, petsc_options or {})
         self.bcs = list(bcs)
+        self._constants = set(F.constants())
         self._system = System(F, u, bcs, entity_maps, structure)
         self.known, self.fixed = self._system.forces.known, self._system.forces.fixed
         free_dropped(self._system.comm)
         # nothing that is prescribed has a reaction then: the residual at the start is the only force to compare with
         criteria = replace(criteria, by_start=criteria.by_start or not (bcs or structure.directions))
         self._iterations = Iterations(self._system, criteria, self._options)
+        self._path: PathIterations | None = None
         self._force = 0.0
 
     @property
@@ -138,6 +141,26 @@ class NonlinearProblem:
             self._force = self._iterations.force
         return outcome
 
+    def solve_path(self, step: PathStep) -> Outcome:
+        """Solve for u and the time at which the path has a given length; see `cutsim.solvers.path`.
+
+        Args:
+            step: The step.
+
+        Returns:
+            The outcome. Failure does not raise and leaves u and the problem at the last iterate.
+        """
+        if self._path is None:
+            self._path = PathIterations(self._system, self._iterations)
+        outcome = self._path.run(step, self._force)
+        if outcome.converged:
+            self._force = self._iterations.force
+        return outcome
+
+    def uses(self, constant: fem.Constant) -> bool:
+        """Whether the residual depends on a constant."""
+        return constant in self._constants
+
     def refresh(self) -> None:
         """Forget what was factorised."""
         self._iterations.linear.forget_pattern()
@@ -183,8 +206,9 @@ class NonlinearProblem:
 
     def destroy(self) -> None:
         """Free the PETSc objects and remove the options of this problem."""
-        for thing in (self._iterations, self._system):
-            thing.destroy()
+        for thing in (self._path, self._iterations, self._system):
+            if thing is not None:
+                thing.destroy()
         self._options.clear()
 
     def __enter__(self) -> Self:
