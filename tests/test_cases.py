@@ -27,7 +27,7 @@ from cutsim import (
     StepControl,
     ThermoElastic,
 )
-from cutsim.analysis.stepping import Control
+from cutsim.analysis.steps import Control
 from cutsim.base.parameters import numbers
 from cutsim.base.units import Kind, Units
 from cutsim.cases import CaseError, built_in_cases, case_schema, read_case

@@ -20,7 +20,7 @@ import typer
 from typer.testing import CliRunner
 
 import cutsim
-from cutsim.analysis.stepping import StepError
+from cutsim.analysis.steps import StepError
 from cutsim.cases import built_in
 from cutsim.cases.importing.draft import Imported
 from cutsim.commands import launch, new

@@ -1,25 +1,27 @@
 """Equilibrium path of a mechanical problem, along which steps are measured by the energy that they lose."""
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from cutsim.base.arrays import Array
-from cutsim.base.terms import Dissipating, Interface, offering
+from cutsim.base.terms import Dissipating, offering
 from cutsim.solvers.balance import Balance
 from cutsim.solvers.iterations import Outcome
 from cutsim.solvers.path import PathStep
 
 
 class EquilibriumPath:
-    """Path of the equilibria of a problem, on which time may go back.
+    """Path of the equilibria of a problem, on which time may go back. Making it is collective.
 
     Args:
         balance: The balance of momentum.
         settle: Completes a solve by augmentations, see `Mechanics.settle`.
         lost: What the trial step has lost by fracture [energy]. Collective.
+
+    Attributes:
+        unit: Energy that breaks a facet of mean size, by which steps are chosen; 0 if nothing can break.
     """
 
     def __init__(
@@ -29,14 +31,12 @@ class EquilibriumPath:
         lost: Callable[[], float],
     ) -> None:
         self._balance, self._settle, self._lost = balance, settle, lost
-        self._breaking = offering(balance.terms, Dissipating)
+        energies = {term: term.facet_energy for term in offering(balance.terms, Dissipating)}
+        # what has no law, such as the faces of a notch, loses nothing
+        self._breaking = [term for term, energy in energies.items() if energy > 0]
+        self.unit = max(energies.values(), default=0.0)
 
-    @cached_property
-    def unit(self) -> float:
-        """Energy that breaks a facet of mean size, by which steps are chosen; 0 if nothing can break."""
-        return max((t.facet_energy for t in offering(self._breaking, Interface)), default=0.0)
-
-    @cached_property
+    @property
     def obstacle(self) -> str | None:
         """Why the path cannot be followed, in words, or None."""
         if self.unit == 0:

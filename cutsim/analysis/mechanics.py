@@ -210,7 +210,7 @@ class Mechanics(Balance[Term, Support]):
 
     @property
     def path(self) -> EquilibriumPath:
-        """The path of its equilibria."""
+        """The path of its equilibria. Collective."""
         return EquilibriumPath(self, self._settle, self._lost)
 
     def _lost(self) -> float:

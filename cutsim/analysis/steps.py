@@ -30,11 +30,13 @@ class Audit(Protocol):
 
 
 class Path(Protocol):
-    """Protocol of the equilibrium path of a problem, on which time may go back."""
+    """Protocol of the equilibrium path of a problem, on which time may go back.
 
-    @property
-    def unit(self) -> float:
-        """Energy that breaks a facet of mean size, by which steps are chosen. Collective."""
+    Attributes:
+        unit: Energy that breaks a facet of mean size, by which steps are chosen.
+    """
+
+    unit: float
 
     @property
     def obstacle(self) -> str | None:
@@ -75,7 +77,7 @@ class Problem(Protocol):
 
     @property
     def path(self) -> Path | None:
-        """Its equilibrium path; None if there is none without time."""
+        """Its equilibrium path; None if there is none without time. Collective."""
 
     @property
     def audit(self) -> Audit:
@@ -140,7 +142,7 @@ class PathFollowing:
         ValueError: A value is outside its range.
     """
 
-    facets: float = 2.0
+    facets: float = 1.0
     onset: float | None = None
 
     def __post_init__(self) -> None:
@@ -148,7 +150,7 @@ class PathFollowing:
         require_number("onset", self.onset, positive.or_none)
 
 
-#: With steps that lose as much as two facets, where nothing else helps.
+#: With steps that lose as much as a facet, where nothing else helps.
 FOLLOWING = PathFollowing()
 
 

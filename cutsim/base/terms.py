@@ -36,6 +36,10 @@ class Assembler(Protocol):
     def pattern(self) -> int:
         """Number of the sparsity pattern, the same on all ranks; another one asks for another matrix."""
 
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether the forces depend on how long a step takes."""
+
     def prepare(self) -> None:
         """Bring coefficients of forms to the present displacement, before each assembly. Collective."""
 
@@ -91,8 +95,8 @@ class Term:
 
     @property
     def rate_dependent(self) -> bool:
-        """Whether the forces depend on how long a step takes, apart from `State.dt` in the form, which tells itself."""
-        return False
+        """Whether the forces depend on how long a step takes; where `State.dt` is in the form, it is known anyway."""
+        return any(assembler.rate_dependent for assembler in self.assemblers)
 
     def begin(self) -> None:
         """Move constants to their value at the end of the step that the state has begun. Collective."""
@@ -172,6 +176,10 @@ class Damaging(Protocol):
 @runtime_checkable
 class Dissipating(Protocol):
     """A term that loses energy as it breaks, by which an equilibrium path is followed."""
+
+    @property
+    def facet_energy(self) -> float:
+        """Energy that breaks a facet of mean size in opening; 0 without a law. Collective."""
 
     def path_measure(self) -> tuple[float, NDArray[np.float64]]:
         """How far the step has come along the path, and the derivative of this. Collective.

@@ -6,7 +6,6 @@ face: T·n > 0 pulls them together.
 """
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -66,6 +65,7 @@ class Crack(Term):
         points: Its integration points, with the facets in the order of all per-facet arrays.
         history: What they remember.
         faces: Kinematics and tractions of the faces at a displacement.
+        path_measure: Gives what the bond loses in a step, see `cutsim.base.terms.Dissipating`.
         friction: Friction of the faces, or None.
         viscosity: Viscosity of the bond, or None.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
@@ -113,6 +113,7 @@ class Crack(Term):
         pressing = self.contact if closing else None
         options = {"current": normal == "current", "augmented": allowed_penetration is not None}
         self.faces = CrackFaces(state, self.points, self.history, law, pressing, **options)
+        self.path_measure = PathMeasure(state, self.points, self.faces, self.history)
         self.friction = CrackFriction(self, friction) if friction else None
         self.viscosity = CrackViscosity(self, law) if isinstance(law, ViscousBond) else None
 
@@ -179,14 +180,6 @@ class Crack(Term):
             return False
         pressure = self.faces.values(1.0)["pressure"]
         return self.history.augment(pressure, self.contact.stiffness * self._allowed_penetration)
-
-    @cached_property
-    def _path_measure(self) -> PathMeasure:
-        return PathMeasure(self.state, self.points, self.faces, self.history)
-
-    def path_measure(self) -> tuple[float, NDArray[np.float64]]:
-        """Energy that the bond loses in the step [energy], and its derivative, owned entries [force]. Collective."""
-        return (0.0, np.zeros(len(self.state.increment))) if self.law is None else self._path_measure()
 
     def energies(self) -> dict[str, float]:
         """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""

@@ -1,6 +1,9 @@
 """Energy that a bond loses in a step, as a form of the displacement: the measure of a path (docs/theory.md §5)."""
 
+from functools import cached_property
+
 import ufl
+from dolfinx import fem
 
 from cutsim.base.assembly import Array, integrate, nodal_forces
 from cutsim.base.compat import form
@@ -26,14 +29,21 @@ class PathMeasure:
     """
 
     def __init__(self, state: State, points: FacetPoints, faces: CrackFaces, history: InterfaceHistory) -> None:
-        before, now = faces.response(state.u_old), faces.response(state.u)
-        memory = points.at(history.secants)
+        self._state, self._points, self._faces, self._history = state, points, faces, history
+
+    @cached_property
+    def _forms(self) -> tuple[fem.Form, fem.Form]:
+        """Loss and derivative: compiled when a path is followed for the first time, which most runs never do."""
+        state, points = self._state, self._points
+        before, now = self._faces.response(state.u_old), self._faces.response(state.u)
+        memory = points.at(self._history.secants)
         softened = [memory[i] - now.secants[i] for i in (0, 1)]
         opened = positive_part(before.opening) * positive_part(now.opening)
         loss = 0.5 * (softened[0] * opened + softened[1] * before.sliding * now.sliding) * points.measure
-        forms = loss, ufl.derivative(loss, state.u, ufl.TestFunction(state.V))
-        self._loss, self._slope = (form(f, entity_maps=points.entity_maps) for f in forms)
+        slope = ufl.derivative(loss, state.u, ufl.TestFunction(state.V))
+        return form(loss, entity_maps=points.entity_maps), form(slope, entity_maps=points.entity_maps)
 
     def __call__(self) -> tuple[float, Array]:
         """Loss [energy], and its derivative, owned entries [force]. Collective."""
-        return integrate(self._loss), nodal_forces(self._slope)
+        loss, slope = self._forms
+        return integrate(loss), nodal_forces(slope)

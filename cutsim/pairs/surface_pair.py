@@ -153,11 +153,6 @@ class SurfacePair(Term):
         points = self.passes[0].points
         return self.law.toughness * points.mean(points.weights.sum(axis=1)) if self.law is not None else 0.0
 
-    @property
-    def rate_dependent(self) -> bool:
-        """Whether the friction is."""
-        return any(p.slip is not None and p.slip.rate_dependent for p in self.passes)
-
     def residual(self, v: Expr) -> ufl.Form:
         """No form: all forces are those of the passes."""
         return ufl.Form([])

@@ -184,6 +184,11 @@ class SurfacePass:
         return PairForces(actions, None if coupling is None else Coupling(actions[0], actions[1], coupling))
 
     @property
+    def rate_dependent(self) -> bool:
+        """Whether the friction depends on how long a step takes."""
+        return self.slip is not None and self.slip.rate_dependent
+
+    @property
     def pattern(self) -> int:
         """Number of the sparsity pattern."""
         return self.kinematics.version

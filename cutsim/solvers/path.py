@@ -188,6 +188,7 @@ class PathIterations:
                 break
             if not linear.improve():
                 return None
+            A.stateIncrease()  # PETSc sets a preconditioner up anew for another matrix only
         if observe:
             linear.observe()
         y: Array = self._y.array_r.copy()

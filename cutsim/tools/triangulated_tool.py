@@ -150,11 +150,6 @@ class TriangulatedTool(RigidTool):
         """Memory of friction of the surface."""
         return [] if self.touch.slip is None else [self.touch.slip]
 
-    @property
-    def rate_dependent(self) -> bool:
-        """Whether the friction is."""
-        return any(slip.rate_dependent for slip in self.slips)
-
     def residual(self, v: Expr) -> ufl.Form:
         """No form: all forces are those of the contact."""
         return ufl.Form([])
