@@ -185,8 +185,8 @@ class SurfacePass:
 
     @property
     def rate_dependent(self) -> bool:
-        """Whether the friction depends on how long a step takes."""
-        return self.slip is not None and self.slip.rate_dependent
+        """Whether friction or bond depend on how long a step takes."""
+        return self.viscous is not None or (self.slip is not None and self.slip.rate_dependent)
 
     @property
     def pattern(self) -> int:
