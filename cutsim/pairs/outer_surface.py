@@ -1,5 +1,6 @@
 """Facets on the boundary of a body, outer or at a cut, and their nodes, distributed or gathered on every rank."""
 
+from functools import cached_property
 from typing import Protocol
 
 import basix
@@ -9,7 +10,9 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.compat import geometry_nodes
 from cutsim.fields.faces import Face
+from cutsim.fields.pieces import mesh_pieces
 from cutsim.fields.points import FacetPoints
 from cutsim.pairs.overlap import inside_body
 from cutsim.pairs.pairing import Array, FacetShape, Indices
@@ -44,6 +47,12 @@ class OuterSurface:
         tangents = np.einsum("ab,fbi->fai", self.shape.values(self.shape.centre[None])[1][0], self.reference)
         outward = self.reference.mean(axis=1) - inside
         self.sides = np.sign(np.einsum("fi,fi->f", normals(tangents), outward))
+
+    @cached_property
+    def pieces(self) -> Indices:
+        """Connected piece of the mesh to which each facet belongs. Collective."""
+        mesh = self.V.mesh
+        return np.asarray(mesh_pieces(mesh)[1][geometry_nodes(mesh)[self.face.cells, 0]], dtype=np.int64)
 
     @property
     def global_nodes(self) -> Indices:
@@ -94,6 +103,10 @@ class Master(Protocol):
     reference: Array
     global_nodes: Indices
 
+    @property
+    def pieces(self) -> Indices:
+        """Connected piece of the mesh to which each facet belongs; −1 for one that belongs to none."""
+
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""
 
@@ -111,7 +124,6 @@ class SharedSurface:
         surface: The facets of this rank.
 
     Attributes:
-        face: The facets of this rank.
         shape, sides, reference: As of `OuterSurface`, for the facets of all ranks.
         global_nodes: Global nodes of each facet.
     """
@@ -119,8 +131,7 @@ class SharedSurface:
     def __init__(self, surface: OuterSurface) -> None:
         V = surface.V
         self._comm: MPI.Comm = V.mesh.comm
-        self.face = surface.face
-        self._mesh, self.shape, self._components = V.mesh, surface.shape, V.dofmap.index_map_bs
+        self._surface, self.shape, self._components = surface, surface.shape, V.dofmap.index_map_bs
         own = surface.owned
         parts = self._comm.allgather((surface.global_nodes[own], surface.sides[own], surface.reference[own]))
         self.global_nodes, self.sides, self.reference = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -130,6 +141,11 @@ class SharedSurface:
         first, last = V.dofmap.index_map.local_range
         self._own = numbers[(numbers >= first) & (numbers < last)] - first
         self._counts = np.array(self._comm.allgather(len(self._own) * self._components))
+
+    @cached_property
+    def pieces(self) -> Indices:
+        """Connected piece of the mesh to which each facet belongs. Collective."""
+        return np.concatenate(self._comm.allgather(self._surface.pieces[self._surface.owned]))
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""
@@ -146,7 +162,7 @@ class SharedSurface:
         """Which points, on the facets of another surface, are in its body in the reference configuration."""
         cells = slave.face.cells
         cells = np.repeat(cells, len(points) // max(len(cells), 1))
-        return inside_body(self._mesh, points, cells, self.face.cells)
+        return inside_body(self._surface.V.mesh, points, cells, self._surface.face.cells)
 
 
 def normals(tangents: Array) -> Array:

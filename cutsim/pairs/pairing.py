@@ -66,7 +66,7 @@ class Hits:
     xi: Array
     gap: Array
 
-    def some(self, rows: NDArray[np.bool_]) -> "Hits":
+    def some(self, rows: NDArray[np.bool_] | Indices) -> "Hits":
         """Some of them."""
         return Hits(self.points[rows], self.facets[rows], self.xi[rows], self.gap[rows])
 
@@ -108,7 +108,7 @@ def project(
     shape: FacetShape,
     search: float,
 ) -> Hits:
-    """Where rays along the normals of points first meet the master surface.
+    """Where rays along the normals of points meet the master surface.
 
     Only the outside of a facet is met, so that a ray through a thin body does not find its back.
 
@@ -122,7 +122,7 @@ def project(
         search: Largest distance of a partner, on either side [length].
 
     Returns:
-        The nearest hit of each point that has one.
+        All hits, in the order of the points.
     """
     points, facets = pairs
     y, near = _in_frames(x, frames, points, facets, master, search)
@@ -136,11 +136,21 @@ def project(
     size = np.abs(y - y[:, :1]).max(axis=(1, 2), initial=0.0)
     outside = sides[facets] * _determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:])) < 0
     hit = shape.contains(xi) & (np.abs(gap) <= search) & (off <= EDGE * size) & outside
-    points, facets, xi, gap = points[hit], facets[hit], xi[hit], gap[hit]
+    order = np.flatnonzero(hit)[np.argsort(points[hit], kind="stable")]
+    return Hits(points[order], facets[order], xi[order], gap[order])
+
+
+def nearest(hits: Hits, last: NDArray[np.bool_]) -> Hits:
+    """The nearest hit of each point.
+
+    Args:
+        hits: All hits.
+        last: Which of them are taken only if there is no other.
+    """
     # a ray through an edge meets both its facets: the one of the lower number is taken, on every rank
-    order = np.lexsort((facets, np.abs(gap), points))
-    first = order[np.unique(points[order], return_index=True)[1]]
-    return Hits(points[first], facets[first], xi[first], gap[first])
+    order = np.lexsort((hits.facets, np.abs(hits.gap), last, hits.points))
+    first = order[np.unique(hits.points[order], return_index=True)[1]]
+    return hits.some(first)
 
 
 def _in_frames(

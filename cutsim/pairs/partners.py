@@ -94,13 +94,22 @@ class CurrentPartners(PairKinematics):
         search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
             come into it during a step, find theirs at any depth.
         size: Mean size of the slave facets [length].
+        folding: Whether the slave surface is a part of the master, which meets itself.
 
     Attributes:
         partners: Search for facets that are near each other, and for partners on them.
     """
 
     def __init__(
-        self, memory: Memory, name: str, slave: SlaveSurface, master: Master, *, search: float, size: float
+        self,
+        memory: Memory,
+        name: str,
+        slave: SlaveSurface,
+        master: Master,
+        *,
+        search: float,
+        size: float,
+        folding: bool = False,
     ) -> None:
         super().__init__(slave, master)
         self._search, self._size = search, size
@@ -110,7 +119,8 @@ class CurrentPartners(PairKinematics):
         rest = np.zeros((len(points.x), points.x.shape[-1] - 1))
         self._slid = memory.value(f"{name}: slide", rest, places=slave.places)
         count = len(self.tables[0])
-        self.partners = PartnerSearch(memory, name, slave, master, points, count, search=search, size=size)
+        lengths = {"search": search, "size": size}
+        self.partners = PartnerSearch(memory, name, slave, master, points, count, **lengths, folding=folding)
         self._old_hits = self.partners.dig_out()
 
     @property

@@ -10,12 +10,14 @@ from cutsim.base.assembly import box
 from cutsim.base.memory import Memory
 from cutsim.pairs.configuration import Points
 from cutsim.pairs.outer_surface import Master, SlaveSurface, normals
-from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, project
+from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, nearest, project
 
 #: Distance both surfaces may move before partners are looked for anew, as a fraction of the mean slave facet's size.
 MARGIN = 0.25
 #: Cosine between the normals of a point and of the facet nearest to it from which one does not stand across the other.
 FACING = 0.5
+#: Distance behind a point that is none, as a fraction of the mean slave facet's size.
+BEHIND = 1e-6
 #: Multiple of the margin beyond which, or if not finite, a displacement is no state to look for partners in.
 WILD = 1e9
 
@@ -66,6 +68,7 @@ class PartnerSearch:
         search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
             come into it during a step, find theirs at any depth.
         size: Mean size of the slave facets [length].
+        folding: Whether the slave surface is a part of the master, which meets itself.
     """
 
     def __init__(
@@ -79,11 +82,12 @@ class PartnerSearch:
         *,
         search: float,
         size: float,
+        folding: bool = False,
     ) -> None:
         self._slave, self._master, self._search, self._margin = slave, master, search, MARGIN * size
-        self._count = count
+        self._count, self._folding, self._touch = count, folding, BEHIND * size
         nodes = slave.reference, master.reference
-        self._start = points, nodes
+        self._reference = self._start = points, nodes
         known = _Known(np.zeros(len(points.x), dtype=bool))
         self._known = memory.value(f"{name}: partners", known, places=slave.places)
         first = self._look_around(points, nodes, search, 0)
@@ -144,7 +148,9 @@ class PartnerSearch:
         of_facet = slaves[:, None] * self._count + np.arange(self._count)
         pairs = of_facet.ravel(), np.repeat(masters, self._count)
         hits = project(points.x, points.frames, pairs, nodes[1], self._master.sides, self._master.shape, reach)
-        return hits.some(self._entered(hits))
+        hits = hits.some(self._entered(hits))
+        # a surface that meets itself: what has been passed hides what lies ahead
+        return nearest(hits, (hits.gap >= -self._touch) & self._folding)
 
     def _known_of(self, hits: Hits) -> _Known:
         met = np.zeros(len(self._start[0].x), dtype=bool)
@@ -161,14 +167,17 @@ class PartnerSearch:
         lost = inside.copy()
         lost[hits.points] = False
         rows = np.flatnonzero(lost & np.repeat(self._slave.owned, self._count))
-        if len(rows) and len(nodes[1]):
-            distance, nearest = cKDTree(nodes[1].mean(axis=1)).query(points.x[rows])
+        own, others = self._slave.pieces[rows // self._count], self._master.pieces
+        for piece in np.unique(own):
+            some, facets = rows[own == piece], np.flatnonzero(others != piece)
+            distance, place = cKDTree(nodes[1][facets].mean(axis=1)).query(points.x[some])
+            closest = facets[place]
             derivatives = self._master.shape.values(self._master.shape.centre[None])[1][0]
-            outward = self._master.sides[nearest, None] * normals(
-                np.einsum("kb,nbi->nki", derivatives, nodes[1][nearest])
+            outward = self._master.sides[closest, None] * normals(
+                np.einsum("kb,nbi->nki", derivatives, nodes[1][closest])
             )
-            facing = np.einsum("ni,ni->n", outward, points.frames[rows, 0]) / np.linalg.norm(outward, axis=1)
-            depth[rows] = np.where(np.abs(facing) > FACING, distance, 0.0)
+            facing = np.einsum("ni,ni->n", outward, points.frames[some, 0]) / np.linalg.norm(outward, axis=1)
+            depth[some] = np.where(np.abs(facing) > FACING, distance, 0.0)
         return depth
 
     def _reach(self, nodes: tuple[Array, Array]) -> float:
@@ -183,16 +192,33 @@ class PartnerSearch:
     def _entered(self, hits: Hits) -> NDArray[np.bool_]:
         """Which partners are in front of their points, near them, or behind because the points have come into the body.
 
-        What a ray meets far behind its point may else be the far side of a thin body.
+        What a ray meets far behind its point may else be the far side of a thin body. A surface that meets itself meets
+        its own back at any distance: partners behind their points have been in front of them, or as deep as is known.
         """
-        (points, nodes), far = self._start, hits.gap < -self._search
-        rows = np.flatnonzero(far & ~self._known.committed.met[hits.points])
-        values = self._master.shape.values(hits.xi[rows])[0]
-        before = np.einsum("nb,nbi->ni", values, nodes[1][hits.facets[rows]]) - points.x[hits.points[rows]]
-        gap = np.einsum("ni,ni->n", before, points.frames[hits.points[rows], 0])
-        keep = np.ones(len(far), dtype=bool)
-        keep[rows] = gap >= -self._search
+        known = self._known.committed
+        met = known.met[hits.points]
+        keep = np.ones(len(met), dtype=bool)
+        if not self._folding:
+            rows = np.flatnonzero((hits.gap < -self._search) & ~met)
+            keep[rows] = self._gap(self._start, hits.some(rows)) >= -self._search
+            return keep
+        rows = np.flatnonzero(hits.gap < -self._touch)
+        behind = hits.some(rows)
+        own = self._slave.global_nodes[behind.points // self._count]
+        beside = (own[:, :, None] == self._master.global_nodes[behind.facets][:, None]).any(axis=(1, 2))
+        deep = self._touch + np.where(met[rows], 2 * known.deep, 0.0)
+        # next to a sharp edge the back is nearer than any depth: there it is known from the reference configuration
+        keep[rows] = np.where(
+            beside, self._gap(self._reference, behind) >= -self._touch, self._gap(self._start, behind) >= -deep
+        )
         return keep
+
+    def _gap(self, at: tuple[Points, tuple[Array, Array]], hits: Hits) -> Array:
+        """Distance of partners from their points along the normals of these, in a configuration."""
+        points, nodes = at
+        values = self._master.shape.values(hits.xi)[0]
+        before = np.einsum("nb,nbi->ni", values, nodes[1][hits.facets]) - points.x[hits.points]
+        return np.asarray(np.einsum("ni,ni->n", before, points.frames[hits.points, 0]))
 
     def _moved(self, nodes: tuple[Array, Array], reach: float) -> bool:
         """Whether rays may have come nearer to other facets than the margin since these were last searched."""

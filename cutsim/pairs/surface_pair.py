@@ -105,6 +105,7 @@ class SurfacePair(Term):
         self.folding = master_facets is None
         lasting = self.folding and small_sliding
         require("small_sliding", small_sliding, not lasting, "False for a surface that meets itself")
+        require("law", law, law is None or not self.folding, "None for a surface that meets itself")
         self.name, self.state, self.law = name, state, law
         slaves = _faces(state, slave_facets, "slave_facets")
         masters = [] if master_facets is None else _faces(state, master_facets, "master_facets")
@@ -137,8 +138,8 @@ class SurfacePair(Term):
         state, name = self.state, f"{self.name} pass {i + 1}"
         points = slave_points(state, face, "slave_facets" if self.signs[i] > 0 else "master_facets")
         surfaces, lengths = (SlaveSurface(state.V, face, points), master), (search, _mean(state, [face], facet_size))
-        bonded = laws.cohesive is not None
-        kinematics = _partners(state.memory, name, surfaces, lengths, small_sliding=small_sliding, bonded=bonded)
+        bonds = (laws.cohesive is not None, small_sliding)
+        kinematics = _partners(state.memory, name, surfaces, lengths, bonds, folding=self.folding)
         weight = 0.5 if self.folding or -1 in self.signs else 1.0
         return SurfacePass(state, name, points, kinematics, laws, weight=weight)
 
@@ -251,15 +252,15 @@ def _partners(
     name: str,
     surfaces: tuple[SlaveSurface, SharedSurface],
     lengths: tuple[float, float],
+    bonds: tuple[bool, bool],
     *,
-    small_sliding: bool,
-    bonded: bool,
+    folding: bool,
 ) -> list[PairKinematics]:
     """What finds the partners of contact, then those of a bond where they are others. Collective."""
-    search, size = lengths
+    (search, size), (bonded, small_sliding) = lengths, bonds
     found: list[PairKinematics] = []
     if not small_sliding:
-        found.append(CurrentPartners(memory, name, *surfaces, search=search, size=size))
+        found.append(CurrentPartners(memory, name, *surfaces, search=search, size=size, folding=folding))
     if small_sliding or bonded:
         found.append(MaterialPartners(memory, f"{name} bond", *surfaces, search=search, size=size))
     return found

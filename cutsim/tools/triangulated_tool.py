@@ -47,6 +47,7 @@ class RigidSurface:
         self.sides: Array = np.ones(len(self._corners))
         self.reference: Array = self._placed(start=True)
         self.global_nodes: Indices = np.full(triangulation.facets.shape, -1)
+        self.pieces: Indices = np.full(len(triangulation.facets), -1)
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, at the start or the end of the step, whatever the displacement."""
