@@ -13,6 +13,7 @@ from .bodies.loads import Traction as Traction
 from .bodies.schemes import GeneralisedAlpha as GeneralisedAlpha
 from .bodies.schemes import Newmark as Newmark
 from .bodies.solid import Solid as Solid
+from .fields.faces import Face as Face
 from .fields.laminate import laminate as laminate
 from .fields.meshing import TaggedMesh as TaggedMesh
 from .fields.meshing import geometry as geometry
@@ -65,6 +66,7 @@ from .materials.rubbers import Ogden as Ogden
 from .materials.rubbers import Yeoh as Yeoh
 from .materials.thermoelastic import ThermoElastic as ThermoElastic
 from .materials.viscoelastic import Prony as Prony
+from .pairs.contact_surfaces import ContactSurfaces as ContactSurfaces
 from .pairs.surface_pair import SurfacePair as SurfacePair
 from .results.checkpoint_file import CheckpointError as CheckpointError
 from .results.checkpoints import Checkpoints as Checkpoints

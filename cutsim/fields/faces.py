@@ -72,6 +72,26 @@ class Face:
         return cls.of_rows(mesh, crack_measure_entities(mesh, facets, plus), side)
 
     @classmethod
+    def both(cls, mesh: Mesh, facets: NDArray[np.int32]) -> tuple[Self, Self]:
+        """The two faces of cuts whose sides have no names: whichever face a facet's side belongs to. Collective.
+
+        Args:
+            mesh: The mesh; on several ranks with ghost mode ``shared_facet``.
+            facets: Local facets along which the space is cracked, those that this rank owns.
+        """
+        tdim = mesh.topology.dim
+        mesh.topology.create_connectivity(tdim - 1, tdim)
+        to_cells = mesh.topology.connectivity(tdim - 1, tdim)
+        pairs = to_cells.array[to_cells.offsets[facets][:, None] + np.arange(2)].astype(np.int32)
+        # the order in which the cells were given is the same on any number of ranks
+        order = np.argsort(mesh.topology.original_cell_index[pairs], axis=1)
+        pairs = np.take_along_axis(pairs, order, axis=1)
+        of_cells = incidence(mesh, tdim, tdim - 1)
+        local = np.argmax(of_cells[pairs] == np.asarray(facets)[:, None, None], axis=2)
+        entities = np.stack([pairs, local], axis=2).astype(np.int32).ravel()
+        return cls.of_rows(mesh, entities, "+"), cls.of_rows(mesh, entities, "-")
+
+    @classmethod
     def of_rows(cls, mesh: Mesh, entities: NDArray[np.int32], side: Literal["+", "-"]) -> Self:
         """One face of the rows of `cutsim.fields.space.crack_measure_entities`. Collective."""
         require("side", side, side in ("+", "-"), "'+' or '-'")

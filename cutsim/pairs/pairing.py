@@ -134,7 +134,9 @@ def project(
     gap = np.einsum("nb,nb->n", values, y[..., 0])
     off = np.abs(np.einsum("nb,nbi->ni", values, y[..., 1:])).max(axis=-1, initial=0.0)
     size = np.abs(y - y[:, :1]).max(axis=(1, 2), initial=0.0)
-    outside = sides[facets] * _determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:])) < 0
+    # a ray within the plane of a facet meets neither its outside nor its inside
+    across = _determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:]))
+    outside = sides[facets] * across < -EDGE * size ** derivatives.shape[1]
     hit = shape.contains(xi) & (np.abs(gap) <= search) & (off <= EDGE * size) & outside
     order = np.flatnonzero(hit)[np.argsort(points[hit], kind="stable")]
     return Hits(points[order], facets[order], xi[order], gap[order])

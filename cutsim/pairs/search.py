@@ -118,19 +118,17 @@ class PartnerSearch:
         Raises:
             ValueError: On all ranks, if there are none for some of them.
         """
-        (points, nodes), hits = self._start, self.hits(*self._start)
-        inside = self._master.holds(points.x, self._slave)
+        (points, nodes), inside = self._start, self._master.holds(self._start[0].x, self._slave)
         low, high = box(self._slave.V.mesh.comm, np.concatenate([n.reshape(-1, n.shape[-1]) for n in nodes]))
+        largest = float(np.linalg.norm(high - low))
+        if self._folding:
+            return self._dig_out_of_others(inside, largest)
+        hits = self.hits(points, nodes)
         depth = self._buried(hits, inside)
         while (deepest := self._slave.maximum(depth.max(initial=0.0))) > 0:
-            lost = self._slave.total(int(np.count_nonzero(depth)))
             deep = self._known.committed.deep
-            if deep > np.linalg.norm(high - low):
-                raise ValueError(
-                    f"slave_facets: {lost} points lie in the body of master_facets from the start, about {deepest:.3g} "
-                    "deep, and their normals do not meet its surface: let the bodies overlap less, or give all facets "
-                    "that face each other"
-                )
+            if deep > largest:
+                raise _buried_for_ever(self._slave.total(int(np.count_nonzero(depth))), deepest)
             # a ray may be longer than the way to the nearest facet
             self._known.set(replace(self._known.committed, met=inside, deep=2 * max(deepest, deep)))
             hits = self.hits(points, nodes)
@@ -138,19 +136,43 @@ class PartnerSearch:
         self._known.set(self._known_of(hits))
         return hits
 
+    def _dig_out_of_others(self, inside: NDArray[np.bool_], largest: float) -> Hits:
+        """The same where all bodies are one surface: who is in another one meets its outside before its own back."""
+        (points, nodes), reach, lost = self._start, self._search, 1
+        while lost:
+            hits = self._met(points, nodes, reach)
+            hits = hits.some(inside[hits.points] & (hits.gap < -self._touch))
+            own = self._slave.pieces[hits.points // self._count] == self._master.pieces[hits.facets]
+            # backs that lie in one plane are those of two bodies side by side
+            hits = nearest(replace(hits, gap=hits.gap + self._touch * own), np.zeros(len(own), dtype=bool))
+            left = inside & np.repeat(self._slave.owned, self._count)
+            left[hits.points] = False
+            lost = self._slave.total(int(np.count_nonzero(left)))
+            if lost and reach > largest:
+                raise _buried_for_ever(lost, reach)
+            reach *= 2
+        own = self._slave.pieces[hits.points // self._count] == self._master.pieces[hits.facets]
+        self._known.set(self._known_of(hits.some(~own)))
+        hits = self.hits(points, nodes)
+        self._known.set(self._known_of(hits))
+        return hits
+
     def hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
-        """Where the rays of the points meet the master."""
-        reach = self._reach(nodes)
+        """Where the rays of the points first meet the master."""
+        hits = self._met(points, nodes, self._reach(nodes))
+        hits = hits.some(self._entered(hits))
+        # a surface that meets itself: what has been passed hides what lies ahead
+        return nearest(hits, (hits.gap >= -self._touch) & self._folding)
+
+    def _met(self, points: Points, nodes: tuple[Array, Array], reach: float) -> Hits:
+        """All places where the rays of the points meet the master."""
         if self._moved(nodes, reach):
             # what has come near is no part of the step: it stays known if the step is given up
             self._found.value = self._look_around(points, nodes, reach, self.version)
         slaves, masters = self.facets
         of_facet = slaves[:, None] * self._count + np.arange(self._count)
         pairs = of_facet.ravel(), np.repeat(masters, self._count)
-        hits = project(points.x, points.frames, pairs, nodes[1], self._master.sides, self._master.shape, reach)
-        hits = hits.some(self._entered(hits))
-        # a surface that meets itself: what has been passed hides what lies ahead
-        return nearest(hits, (hits.gap >= -self._touch) & self._folding)
+        return project(points.x, points.frames, pairs, nodes[1], self._master.sides, self._master.shape, reach)
 
     def _known_of(self, hits: Hits) -> _Known:
         met = np.zeros(len(self._start[0].x), dtype=bool)
@@ -167,17 +189,14 @@ class PartnerSearch:
         lost = inside.copy()
         lost[hits.points] = False
         rows = np.flatnonzero(lost & np.repeat(self._slave.owned, self._count))
-        own, others = self._slave.pieces[rows // self._count], self._master.pieces
-        for piece in np.unique(own):
-            some, facets = rows[own == piece], np.flatnonzero(others != piece)
-            distance, place = cKDTree(nodes[1][facets].mean(axis=1)).query(points.x[some])
-            closest = facets[place]
+        if len(rows) and len(nodes[1]):
+            distance, closest = cKDTree(nodes[1].mean(axis=1)).query(points.x[rows])
             derivatives = self._master.shape.values(self._master.shape.centre[None])[1][0]
             outward = self._master.sides[closest, None] * normals(
                 np.einsum("kb,nbi->nki", derivatives, nodes[1][closest])
             )
-            facing = np.einsum("ni,ni->n", outward, points.frames[some, 0]) / np.linalg.norm(outward, axis=1)
-            depth[some] = np.where(np.abs(facing) > FACING, distance, 0.0)
+            facing = np.einsum("ni,ni->n", outward, points.frames[rows, 0]) / np.linalg.norm(outward, axis=1)
+            depth[rows] = np.where(np.abs(facing) > FACING, distance, 0.0)
         return depth
 
     def _reach(self, nodes: tuple[Array, Array]) -> float:
@@ -234,3 +253,10 @@ class PartnerSearch:
         shape = len(nodes[0]), self._count, points.x.shape[-1]
         rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
         return _Found(near_facets(rays, nodes[1], self._margin), nodes, reach, version + 1)
+
+
+def _buried_for_ever(points: int, depth: float) -> ValueError:
+    return ValueError(
+        f"slave_facets: {points} points lie in the body of master_facets from the start, about {depth:.3g} deep, and "
+        "their normals do not meet its surface: let the bodies overlap less, or give all facets that face each other"
+    )

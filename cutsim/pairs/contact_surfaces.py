@@ -1,0 +1,75 @@
+"""All surfaces of bodies that may touch, found without being named (docs/theory.md §3.5; thesis 7.3)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from dolfinx.mesh import exterior_facet_indices
+from numpy.typing import NDArray
+
+from cutsim.base.checks import require
+from cutsim.base.signatures import checked
+from cutsim.bodies.solid import Solid
+from cutsim.fields.faces import Face
+from cutsim.fields.space import CRACKED, sum_over_ranks
+from cutsim.fields.state import State
+from cutsim.pairs.surface_pair import SurfacePair
+
+
+@dataclass(frozen=True, eq=False)
+class ContactSurfaces:
+    """Surfaces any of which may meet any other one, or itself.
+
+    Attributes:
+        state: Displacement and time.
+        faces: The surfaces; no side of a facet is in two of them.
+        young: Young's modulus of the softest body, for the automatic penalty [stress].
+    """
+
+    state: State
+    faces: tuple[Face, ...]
+    young: float
+
+    @classmethod
+    @checked
+    def automatic(cls, bodies: Sequence[Solid], without: NDArray[np.int32] | None = None) -> Self:
+        """The outer boundary of some bodies, and both faces of all cuts in them and between them. Collective.
+
+        Args:
+            bodies: The bodies; the same state belongs to all.
+            without: Local facets that are left out, such as those of a crack whose faces press on each other
+                themselves (`Crack` with closing=True); ghosts included.
+
+        Raises:
+            ValueError: There is no body, or bodies have different states.
+        """
+        require("bodies", bodies, len(bodies) > 0, "at least one body")
+        state, mesh = bodies[0].state, bodies[0].state.mesh
+        require("bodies", bodies, all(b.state is state for b in bodies), "bodies of one state")
+        tdim = mesh.topology.dim
+        mesh.topology.create_connectivity(tdim - 1, tdim)
+        facet_map, cell_map = mesh.topology.index_map(tdim - 1), mesh.topology.index_map(tdim)
+        outer = np.zeros(facet_map.size_local + facet_map.num_ghosts, dtype=np.int32)
+        outer[exterior_facet_indices(mesh.topology)] = 1
+        cracked = vars(state.V).get(CRACKED, np.zeros(len(outer), dtype=bool)).copy()
+        left = np.ones(len(outer), dtype=bool)
+        left[[] if without is None else without] = False
+        filled = np.zeros(cell_map.size_local + cell_map.num_ghosts, dtype=np.int32)
+        for body in bodies:
+            filled[slice(None) if body.cells is None else body.cells] = 1
+        filled = sum_over_ranks(cell_map, filled)
+        cut = np.flatnonzero((cracked & left)[: facet_map.size_local]).astype(np.int32)
+        surface = np.flatnonzero((sum_over_ranks(facet_map, outer) > 0) & left).astype(np.int32)
+        found = [Face.outer(mesh, surface), *Face.both(mesh, cut)]
+        faces = [face.some(np.flatnonzero(filled[face.cells])) for face in found]
+        there = [face for face in faces if mesh.comm.allreduce(len(face.facets))]
+        return cls(state, tuple(there), min(body.material.young for body in bodies))
+
+    def pair(self, **options: Any) -> SurfacePair:
+        """Their contact, in which each point looks for its partner on all of them while running. Collective.
+
+        Args:
+            **options: Further arguments of `SurfacePair`, such as ``friction=0.3``.
+        """
+        return SurfacePair(self.state, self.faces, **{"young": self.young, **options})
