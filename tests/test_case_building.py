@@ -64,6 +64,45 @@ until = 3
 [steps]
 fixed = 0.5
 """
+#: A block that is cut through, whose upper half is lifted, moved aside by a half, pressed and drawn.
+CUT = """
+title = "halves"
+[mesh]
+geometry = "blocks"
+dim = 3
+set = { B = 4, H = 1, L = 4, nx = 4, ly = 1 }
+[material]
+model = "linear-elastic"
+young = 100
+poisson = 0
+[crack]
+facets = "crack"
+plus = "lower"
+law = "none"
+closing = false
+[pair]
+friction = 0.25
+contact = { stiffness = 100 }
+SURFACES
+[supports.press]
+cells = "upper"
+direction = "y"
+value = { times = [0, 1, 2, 3], values = [0, 0.5, 0.5, -0.02] }
+[supports.draw]
+cells = "upper"
+direction = "x"
+value = { times = [0, 1, 2, 3, 4], values = [0, 0, 2, 2, 1] }
+[supports.guide]
+cells = "upper"
+direction = "z"
+[supports.ground]
+cells = "lower"
+direction = "all"
+[analysis]
+until = 4
+[steps]
+fixed = 0.5
+"""
 HEAT = """
 [heat]
 initial = "20 degC"
@@ -162,6 +201,31 @@ def test_a_pair_rubs(written):
     row, _ = last(simulation)
     assert row["press_force"] > 1.0 and row["draw_force"] == pytest.approx(0.25 * row["press_force"], rel=0.01)
     assert simulation.curve == ("press_displacement", "press_force")
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    "surfaces", ['slave = "crack+"\nmaster = "crack-"', 'slave = ["crack+", "crack-"]', "automatic = true"]
+)
+def test_faces_of_a_crack_slide(written, surfaces):
+    row, _ = last(read_case(written(CUT.replace("SURFACES", surfaces))).build(COMM))
+    assert row["press_force"] == pytest.approx(-100 * 0.02 * 12, rel=1e-6)
+    assert row["draw_force"] == pytest.approx(-0.25 * 100 * 0.02 * 12, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("surfaces", "words"),
+    [
+        ("", "pair.slave: missing"),
+        ('slave = "crack+"\nautomatic = true', "pair.slave: .*not allowed beside automatic"),
+        ('slave = "crack"\nmaster = "crack-"', "pair.slave.*: .*between two cells"),
+        ('slave = "crack+"\nmaster = "crack*"', r"pair.master: 'crack\*': must be one of the surfaces"),
+        ('slave = "top"\nlaw = { model = "exponential", strength = 1, opening = 1 }', "pair.law: .*meets itself"),
+    ],
+)
+def test_surfaces_that_cannot_be(written, surfaces, words):
+    with pytest.raises(CaseError, match=words):
+        read_case(written(CUT.replace("SURFACES", surfaces))).build(COMM)
 
 
 def test_heat_flows_through_a_strip(written):

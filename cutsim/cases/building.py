@@ -156,7 +156,7 @@ def _general(domain: Domain) -> Simulation:
     bodies = solids(domain, state, value)
     faces = cracks(domain, bodies)
     rubbing = {friction.crack.name: friction for friction in crack_friction(domain, faces, value)}
-    joined, rigid = pairs(domain, bodies), tools(domain, bodies, faces, value)
+    joined, rigid = pairs(domain, bodies, faces), tools(domain, bodies, faces, value)
     parts = Parts(bodies, faces, rubbing, joined, {name: [tool] for name, tool in rigid.items()})
     touching = [*faces.values(), *rubbing.values(), *joined.values(), *rigid.values()]
     terms = [*bodies, *touching, *loads(domain, state, bodies)]

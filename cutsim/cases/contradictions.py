@@ -5,7 +5,7 @@ from typing import Any
 
 from cutsim.cases.geometries import LAMINATE
 from cutsim.cases.keys import Keys
-from cutsim.cases.schema_parts import Tool, Weight
+from cutsim.cases.schema_parts import Pair, Tool, Weight
 
 _ABSOLUTE_ZERO = {"K": 0.0, "degC": -273.15}
 # vectors of the motions of tools
@@ -20,7 +20,7 @@ def contradictions(valid: Mapping[str, Any]) -> Iterator[Problem]:
     Args:
         valid: Those tables that are valid by themselves; what concerns others is not looked at.
     """
-    for check in (_dimension, _materials, _laws, _layers, _insertion, _end, _tools, _dynamics, _heat):
+    for check in (_dimension, _materials, _laws, _layers, _insertion, _end, _pairs, _tools, _dynamics, _heat):
         try:
             yield from check(valid)
         except KeyError:  # it concerns a table that is not valid
@@ -127,6 +127,21 @@ def _end(valid: Mapping[str, Any]) -> Iterator[Problem]:
         yield ("analysis", "until"), f"missing, must be given: the time at which the run ends{where}", None
     if depth is not None and valid["analysis"].until is not None:
         yield ("analysis", "until"), "not allowed beside depth in [insertion]", valid["analysis"].until
+
+
+def _pairs(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    pairs: Mapping[str, Pair] = valid["pairs"]
+    for name, pair in pairs.items():
+        if not pair.slave and not pair.automatic:
+            words = "missing, must be given: a surface that touches another one, or itself; or automatic = true"
+            yield ("pairs", name, "slave"), words, None
+        if pair.automatic and (pair.slave or pair.master):
+            key = "slave" if pair.slave else "master"
+            yield ("pairs", name, key), "not allowed beside automatic, which takes all surfaces", None
+        if pair.master or not pair.slave:
+            continue
+        if pair.law is not None and not isinstance(pair.law, str):
+            yield ("pairs", name, "law"), "not allowed for a surface that meets itself: give a master", None
 
 
 def _tools(valid: Mapping[str, Any]) -> Iterator[Problem]:

@@ -1,16 +1,24 @@
 """Cracks and pairs of surfaces of a case."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Literal
+
+import numpy as np
 
 from cutsim.bodies.solid import Solid
 from cutsim.cases import schema_parts as schema
 from cutsim.cases.bodies import softest
 from cutsim.cases.domains import Domain
+from cutsim.cases.keys import Keys
 from cutsim.cases.refusals import refusing
+from cutsim.fields.faces import Face
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.crack import Crack
 from cutsim.interface.crack_friction import CrackFriction
+from cutsim.pairs.contact_surfaces import ContactSurfaces
 from cutsim.pairs.surface_pair import SurfacePair
+
+_SIDES: tuple[Literal["+", "-"], ...] = ("+", "-")
 
 
 def cracks(domain: Domain, solids: tuple[Solid, ...]) -> dict[str, Crack]:
@@ -37,6 +45,7 @@ def _crack(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.C
             contact=table.contact,
             allowed_penetration=table.allowed_penetration,
             normal=table.normal,
+            closing=table.closing,
         )
 
 
@@ -56,25 +65,34 @@ def crack_friction(
                 )
 
 
-def pairs(domain: Domain, solids: tuple[Solid, ...]) -> dict[str, SurfacePair]:
+def pairs(domain: Domain, solids: tuple[Solid, ...], cracks: Mapping[str, Crack]) -> dict[str, SurfacePair]:
     """Pairs of surfaces of a case by name. Collective.
 
     Raises:
         CaseError: A group is missing, or a pair refuses a parameter.
     """
-    return {name: _pair(domain, solids, name, table) for name, table in domain.tables.pairs.items()}
+    return {name: _pair(domain, solids, cracks, name, table) for name, table in domain.tables.pairs.items()}
 
 
-def _pair(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.Pair) -> SurfacePair:
+def _pair(
+    domain: Domain, solids: tuple[Solid, ...], cracks: Mapping[str, Crack], name: str, table: schema.Pair
+) -> SurfacePair:
     key = ("pairs", name)
-    slave, master = (domain.facets((*key, side), getattr(table, side)) for side in ("slave", "master"))
+    if table.automatic:
+        closing = [crack.interior for crack in cracks.values() if crack.closing]
+        surfaces = ContactSurfaces.automatic(solids, np.concatenate(closing) if closing else None)
+        sides: list[Sequence[Face]] = [surfaces.faces, ()]
+        young = surfaces.young
+    else:
+        sides = [_surface(domain, (*key, side), getattr(table, side), cracks) for side in ("slave", "master")]
+        young = min(softest(solids, face.facets) for side in sides for face in side)
     with refusing(domain.document, *key):
         return SurfacePair(
             solids[0].state,
-            slave,
-            master,
+            sides[0],
+            sides[1] or None,
             table.law,
-            young=table.young or min(softest(solids, slave), softest(solids, master)),
+            young=table.young or young,
             contact=table.contact,
             friction=table.friction,
             allowed_penetration=table.allowed_penetration,
@@ -84,3 +102,15 @@ def _pair(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.Pa
             search=table.search,
             name=name,
         )
+
+
+def _surface(domain: Domain, key: Keys, names: Sequence[str], cracks: Mapping[str, Crack]) -> Sequence[Face]:
+    """The faces of a surface, of which outer ones are one. Collective."""
+    sides = {f"{name}{side}": (crack, side) for name, crack in cracks.items() for side in _SIDES}
+    faces = [crack.face(side) for crack, side in (sides[name] for name in names if name in sides)]
+    outer = [name for name in names if name not in sides]
+    if outer:
+        facets = domain.facets(key, outer)
+        with refusing(domain.document, *key[:-1]):
+            faces.append(Face.outer(domain.tagged.mesh, facets, str(key[-1])))
+    return faces

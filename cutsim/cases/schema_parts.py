@@ -107,28 +107,34 @@ class Crack(Interface):
         plus: Group of cells on its '+' side, or a direction that points out of them.
         acts_on: Where friction acts: on the "broken" part of the bond, or wherever there is "contact".
         normal: Normal of the "current" or of the "reference" configuration (small strain).
+        closing: Whether closed faces press on the points that they met at the start. Faces that slide over each other
+            need false, and a pair of the two, such as ``slave = "glue+"`` with ``master = "glue-"``.
     """
 
     facets: Groups
     plus: Annotated[Annotated[Group, Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM]
     acts_on: Literal["broken", "contact", "tension"] = "broken"
     normal: Literal["current", "reference"] = "current"
+    closing: Flag = True
 
 
 class Pair(Interface):
-    """Pair of outer surfaces that touch; their meshes need not match.
+    """Pair of surfaces that touch, or a surface that meets itself; their meshes need not match.
 
     Args:
-        slave: Groups of facets of the finer or softer surface.
-        master: Groups of facets of the other one.
+        slave: The finer or softer surface: groups of outer facets, and faces of cracks such as "glue+".
+        master: The other one; without it the first one may fold and meet itself.
+        automatic: Whether, in place of a slave and a master, all outer surfaces and faces of cuts may meet each other;
+            faces of cracks that press on each other themselves (``closing``) are left out.
         law: Cohesive law, with small sliding only; by default contact only.
         small_sliding: Whether each point keeps its partner, as bonds do.
         two_pass: Whether each surface is slave once.
         search: Largest distance of a partner; by default the mean size of the slave facets [length].
     """
 
-    slave: Groups
-    master: Groups
+    slave: Surfaces = ()
+    master: Surfaces = ()
+    automatic: Flag = False
     small_sliding: Flag = False
     two_pass: Flag = False
     search: Annotated[Length, POSITIVE] | None = None

@@ -47,7 +47,7 @@ class Face:
         to_cells = mesh.topology.connectivity(tdim - 1, tdim)
         facets = np.unique(np.asarray(facets, dtype=np.int32))
         inner = mesh.comm.allreduce(int(np.count_nonzero(np.diff(to_cells.offsets)[facets] != 1)))
-        require(name, f"{inner} facets between two cells", inner == 0, "of the outer boundary, or a `Face` of a cut")
+        require(name, f"{inner} facets between two cells", inner == 0, "of the outer boundary: of a cut, name a face")
         return cls._of(mesh, facets, to_cells.array[to_cells.offsets[facets]])
 
     @classmethod

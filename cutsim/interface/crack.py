@@ -67,6 +67,7 @@ class Crack(Term):
         faces: Kinematics and tractions of the faces at a displacement.
         path_measure: Gives what the bond loses in a step, see `cutsim.base.terms.Dissipating`.
         friction: Friction of the faces, or None.
+        closing: Whether closed faces press on each other.
         viscosity: Viscosity of the bond, or None.
         entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
         normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
@@ -112,6 +113,7 @@ class Crack(Term):
         self.history = InterfaceHistory(state.memory, name, self.points, law)
         pressing = self.contact if closing else None
         options = {"current": normal == "current", "augmented": allowed_penetration is not None}
+        self.closing = closing
         self.faces = CrackFaces(state, self.points, self.history, law, pressing, **options)
         self.path_measure = PathMeasure(state, self.points, self.faces, self.history)
         self.friction = CrackFriction(self, friction) if friction else None

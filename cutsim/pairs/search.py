@@ -212,7 +212,8 @@ class PartnerSearch:
         """Which partners are in front of their points, near them, or behind because the points have come into the body.
 
         What a ray meets far behind its point may else be the far side of a thin body. A surface that meets itself meets
-        its own back at any distance: partners behind their points have been in front of them, or as deep as is known.
+        its own back at any distance: partners behind their points were in front of them in the reference configuration,
+        or at the start of the step, or are known to be that deep.
         """
         known = self._known.committed
         met = known.met[hits.points]
@@ -225,11 +226,11 @@ class PartnerSearch:
         behind = hits.some(rows)
         own = self._slave.global_nodes[behind.points // self._count]
         beside = (own[:, :, None] == self._master.global_nodes[behind.facets][:, None]).any(axis=(1, 2))
-        deep = self._touch + np.where(met[rows], 2 * known.deep, 0.0)
-        # next to a sharp edge the back is nearer than any depth: there it is known from the reference configuration
-        keep[rows] = np.where(
-            beside, self._gap(self._reference, behind) >= -self._touch, self._gap(self._start, behind) >= -deep
-        )
+        others = self._slave.pieces[behind.points // self._count] != self._master.pieces[behind.facets]
+        deep = self._touch + np.where(met[rows] | others, 2 * known.deep, 0.0)
+        # next to a sharp edge the back is nearer than any depth
+        entered = (self._gap(self._start, behind) >= -deep) & ~beside
+        keep[rows] = entered | (self._gap(self._reference, behind) >= -self._touch)
         return keep
 
     def _gap(self, at: tuple[Points, tuple[Array, Array]], hits: Hits) -> Array:
