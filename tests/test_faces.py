@@ -303,5 +303,8 @@ def test_refusals():
         crack.face("plus")
     with pytest.raises(ValueError, match="side"):
         Face.cut(b.state.mesh, b.facets, b.lower, "left")
+    pair = SurfacePair(b.state, *faces, young=E)
+    with pytest.raises(ValueError, match=r"'crack' and pair 'pair' share .* closing=False"):
+        Mechanics(b.state, [b.solid(), crack, pair], b.drive(b.lower, [0.0, 0.0]))
     with pytest.raises(ValueError, match="bodies"):
         ContactSurfaces.automatic([])

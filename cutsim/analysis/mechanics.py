@@ -259,7 +259,7 @@ class Mechanics(Balance[Term, Support]):
 def _check_places(state: State, terms: Sequence[Term]) -> None:
     """Refuse solids that share cells and cracks that share facets, and doubt gaps in these. Collective."""
     check_disjoint(state.mesh, offering(terms, Body))
-    check_cracks(state, offering(terms, Bonded))
+    check_cracks(state, offering(terms, Bonded), offering(terms, Joining))
 
 
 def _interface_nodes(state: State, interfaces: Sequence[Interface]) -> NDArray[np.int32]:

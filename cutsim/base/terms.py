@@ -292,9 +292,11 @@ class Bonded(Protocol):
 
     Attributes:
         name: Its name.
+        closing: Whether the two sides of a facet press on each other.
     """
 
     name: str
+    closing: bool
 
     @property
     def interior(self) -> NDArray[np.int32]:
@@ -306,10 +308,14 @@ class Joining(Protocol):
     """A term that joins surfaces whose nodes may lie in the same places.
 
     Attributes:
-        facets: Local exterior facets of each surface.
+        name: Its name.
     """
 
-    facets: Sequence[NDArray[np.int32]]
+    name: str
+
+    @property
+    def facets(self) -> Sequence[NDArray[np.int32]]:
+        """Local facets of each surface, ghosts included."""
 
 
 class Observer(Protocol):

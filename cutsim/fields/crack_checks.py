@@ -9,7 +9,7 @@ from dolfinx.mesh import Mesh, compute_midpoints, exterior_facet_indices
 from numpy.typing import NDArray
 
 from cutsim.base.checks import place
-from cutsim.base.terms import Bonded
+from cutsim.base.terms import Bonded, Joining
 from cutsim.base.verdict import Verdict
 from cutsim.fields.sizes import incidence
 from cutsim.fields.space import CRACKED, refuse, sum_over_ranks
@@ -40,16 +40,24 @@ def check_cracked(V: fem.FunctionSpace, facets: NDArray[np.int32], name: str) ->
     refuse(V.mesh.comm, problem)
 
 
-def check_cracks(state: State, cracks: Sequence[Bonded]) -> None:
+def check_cracks(state: State, cracks: Sequence[Bonded], pairs: Sequence[Joining] = ()) -> None:
     """Refuse two cracks on one facet, whose laws would add up, and doubt gaps in them. Collective.
 
     Args:
         state: Displacement and time.
         cracks: What acts on interior facets.
+        pairs: What joins surfaces, which may be faces of the cracks.
 
     Raises:
-        ValueError: Two cracks share a facet.
+        ValueError: Two cracks share a facet, or faces of a crack press on each other and are surfaces of a pair, too.
     """
+    for crack, pair in ((c, p) for c in cracks if c.closing for p in pairs):
+        both = max(state.mesh.comm.allreduce(len(np.intersect1d(crack.interior, facets))) for facets in pair.facets)
+        if both:
+            raise ValueError(
+                f"crack {crack.name!r} and pair {pair.name!r} share {both} facets, on which both would press: give the "
+                "crack closing=False, or leave its faces out of the pair"
+            )
     for one, other in combinations(cracks, 2):
         both = state.mesh.comm.allreduce(len(np.intersect1d(one.interior, other.interior)))
         if both:

@@ -46,7 +46,8 @@ class Face:
         mesh.topology.create_connectivity(tdim - 1, tdim)
         to_cells = mesh.topology.connectivity(tdim - 1, tdim)
         facets = np.unique(np.asarray(facets, dtype=np.int32))
-        inner = mesh.comm.allreduce(int(np.count_nonzero(np.diff(to_cells.offsets)[facets] != 1)))
+        owned = facets < mesh.topology.index_map(tdim - 1).size_local
+        inner = mesh.comm.allreduce(int(np.count_nonzero(np.diff(to_cells.offsets)[facets[owned]] != 1)))
         require(name, f"{inner} facets between two cells", inner == 0, "of the outer boundary: of a cut, name a face")
         return cls._of(mesh, facets, to_cells.array[to_cells.offsets[facets]])
 

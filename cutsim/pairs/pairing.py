@@ -142,7 +142,7 @@ def project(
     return Hits(points[order], facets[order], xi[order], gap[order])
 
 
-def nearest(hits: Hits, last: NDArray[np.bool_]) -> Hits:
+def nearest(hits: Hits, last: NDArray[np.bool_] | None = None) -> Hits:
     """The nearest hit of each point.
 
     Args:
@@ -150,7 +150,8 @@ def nearest(hits: Hits, last: NDArray[np.bool_]) -> Hits:
         last: Which of them are taken only if there is no other.
     """
     # a ray through an edge meets both its facets: the one of the lower number is taken, on every rank
-    order = np.lexsort((hits.facets, np.abs(hits.gap), last, hits.points))
+    rank = np.zeros(len(hits.points), dtype=bool) if last is None else last
+    order = np.lexsort((hits.facets, np.abs(hits.gap), rank, hits.points))
     first = order[np.unique(hits.points[order], return_index=True)[1]]
     return hits.some(first)
 

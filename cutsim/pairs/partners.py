@@ -6,6 +6,7 @@ import numpy as np
 from cutsim.base.memory import Memory
 from cutsim.fields.points import DEGREE
 from cutsim.pairs.configuration import OnRay, Pairs, Points
+from cutsim.pairs.folding import FoldingSearch
 from cutsim.pairs.outer_surface import Master, SlaveSurface
 from cutsim.pairs.pairing import Array, Hits, Indices
 from cutsim.pairs.search import PartnerSearch
@@ -119,8 +120,8 @@ class CurrentPartners(PairKinematics):
         rest = np.zeros((len(points.x), points.x.shape[-1] - 1))
         self._slid = memory.value(f"{name}: slide", rest, places=slave.places)
         count = len(self.tables[0])
-        lengths = {"search": search, "size": size}
-        self.partners = PartnerSearch(memory, name, slave, master, points, count, **lengths, folding=folding)
+        kind = FoldingSearch if folding else PartnerSearch
+        self.partners = kind(memory, name, slave, master, points, count, search=search, size=size)
         self._old_hits = self.partners.dig_out()
 
     @property

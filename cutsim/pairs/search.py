@@ -16,8 +16,6 @@ from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, nearest, pro
 MARGIN = 0.25
 #: Cosine between the normals of a point and of the facet nearest to it from which one does not stand across the other.
 FACING = 0.5
-#: Distance behind a point that is none, as a fraction of the mean slave facet's size.
-BEHIND = 1e-6
 #: Multiple of the margin beyond which, or if not finite, a displacement is no state to look for partners in.
 WILD = 1e9
 
@@ -68,7 +66,6 @@ class PartnerSearch:
         search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
             come into it during a step, find theirs at any depth.
         size: Mean size of the slave facets [length].
-        folding: Whether the slave surface is a part of the master, which meets itself.
     """
 
     def __init__(
@@ -82,12 +79,11 @@ class PartnerSearch:
         *,
         search: float,
         size: float,
-        folding: bool = False,
     ) -> None:
         self._slave, self._master, self._search, self._margin = slave, master, search, MARGIN * size
-        self._count, self._folding, self._touch = count, folding, BEHIND * size
+        self._count = count
         nodes = slave.reference, master.reference
-        self._reference = self._start = points, nodes
+        self._start = points, nodes
         known = _Known(np.zeros(len(points.x), dtype=bool))
         self._known = memory.value(f"{name}: partners", known, places=slave.places)
         first = self._look_around(points, nodes, search, 0)
@@ -118,17 +114,13 @@ class PartnerSearch:
         Raises:
             ValueError: On all ranks, if there are none for some of them.
         """
-        (points, nodes), inside = self._start, self._master.holds(self._start[0].x, self._slave)
-        low, high = box(self._slave.V.mesh.comm, np.concatenate([n.reshape(-1, n.shape[-1]) for n in nodes]))
-        largest = float(np.linalg.norm(high - low))
-        if self._folding:
-            return self._dig_out_of_others(inside, largest)
-        hits = self.hits(points, nodes)
+        (points, nodes), hits = self._start, self.hits(*self._start)
+        inside = self._master.holds(points.x, self._slave)
         depth = self._buried(hits, inside)
         while (deepest := self._slave.maximum(depth.max(initial=0.0))) > 0:
             deep = self._known.committed.deep
-            if deep > largest:
-                raise _buried_for_ever(self._slave.total(int(np.count_nonzero(depth))), deepest)
+            if deep > self._largest:
+                raise buried_for_ever(self._slave.total(int(np.count_nonzero(depth))), deepest)
             # a ray may be longer than the way to the nearest facet
             self._known.set(replace(self._known.committed, met=inside, deep=2 * max(deepest, deep)))
             hits = self.hits(points, nodes)
@@ -136,33 +128,10 @@ class PartnerSearch:
         self._known.set(self._known_of(hits))
         return hits
 
-    def _dig_out_of_others(self, inside: NDArray[np.bool_], largest: float) -> Hits:
-        """The same where all bodies are one surface: who is in another one meets its outside before its own back."""
-        (points, nodes), reach, lost = self._start, self._search, 1
-        while lost:
-            hits = self._met(points, nodes, reach)
-            hits = hits.some(inside[hits.points] & (hits.gap < -self._touch))
-            own = self._slave.pieces[hits.points // self._count] == self._master.pieces[hits.facets]
-            # backs that lie in one plane are those of two bodies side by side
-            hits = nearest(replace(hits, gap=hits.gap + self._touch * own), np.zeros(len(own), dtype=bool))
-            left = inside & np.repeat(self._slave.owned, self._count)
-            left[hits.points] = False
-            lost = self._slave.total(int(np.count_nonzero(left)))
-            if lost and reach > largest:
-                raise _buried_for_ever(lost, reach)
-            reach *= 2
-        own = self._slave.pieces[hits.points // self._count] == self._master.pieces[hits.facets]
-        self._known.set(self._known_of(hits.some(~own)))
-        hits = self.hits(points, nodes)
-        self._known.set(self._known_of(hits))
-        return hits
-
     def hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
         """Where the rays of the points first meet the master."""
         hits = self._met(points, nodes, self._reach(nodes))
-        hits = hits.some(self._entered(hits))
-        # a surface that meets itself: what has been passed hides what lies ahead
-        return nearest(hits, (hits.gap >= -self._touch) & self._folding)
+        return nearest(hits.some(self._entered(hits)))
 
     def _met(self, points: Points, nodes: tuple[Array, Array], reach: float) -> Hits:
         """All places where the rays of the points meet the master."""
@@ -173,6 +142,13 @@ class PartnerSearch:
         of_facet = slaves[:, None] * self._count + np.arange(self._count)
         pairs = of_facet.ravel(), np.repeat(masters, self._count)
         return project(points.x, points.frames, pairs, nodes[1], self._master.sides, self._master.shape, reach)
+
+    @property
+    def _largest(self) -> float:
+        """Size of both surfaces at the start of the step. Collective."""
+        x = np.concatenate([n.reshape(-1, n.shape[-1]) for n in self._start[1]])
+        low, high = box(self._slave.V.mesh.comm, x)
+        return float(np.linalg.norm(high - low))
 
     def _known_of(self, hits: Hits) -> _Known:
         met = np.zeros(len(self._start[0].x), dtype=bool)
@@ -211,26 +187,11 @@ class PartnerSearch:
     def _entered(self, hits: Hits) -> NDArray[np.bool_]:
         """Which partners are in front of their points, near them, or behind because the points have come into the body.
 
-        What a ray meets far behind its point may else be the far side of a thin body. A surface that meets itself meets
-        its own back at any distance: partners behind their points were in front of them in the reference configuration,
-        or at the start of the step, or are known to be that deep.
+        What a ray meets far behind its point may else be the far side of a thin body.
         """
-        known = self._known.committed
-        met = known.met[hits.points]
-        keep = np.ones(len(met), dtype=bool)
-        if not self._folding:
-            rows = np.flatnonzero((hits.gap < -self._search) & ~met)
-            keep[rows] = self._gap(self._start, hits.some(rows)) >= -self._search
-            return keep
-        rows = np.flatnonzero(hits.gap < -self._touch)
-        behind = hits.some(rows)
-        own = self._slave.global_nodes[behind.points // self._count]
-        beside = (own[:, :, None] == self._master.global_nodes[behind.facets][:, None]).any(axis=(1, 2))
-        others = self._slave.pieces[behind.points // self._count] != self._master.pieces[behind.facets]
-        deep = self._touch + np.where(met[rows] | others, 2 * known.deep, 0.0)
-        # next to a sharp edge the back is nearer than any depth
-        entered = (self._gap(self._start, behind) >= -deep) & ~beside
-        keep[rows] = entered | (self._gap(self._reference, behind) >= -self._touch)
+        keep = np.ones(len(hits.points), dtype=bool)
+        rows = np.flatnonzero((hits.gap < -self._search) & ~self._known.committed.met[hits.points])
+        keep[rows] = self._gap(self._start, hits.some(rows)) >= -self._search
         return keep
 
     def _gap(self, at: tuple[Points, tuple[Array, Array]], hits: Hits) -> Array:
@@ -256,7 +217,8 @@ class PartnerSearch:
         return _Found(near_facets(rays, nodes[1], self._margin), nodes, reach, version + 1)
 
 
-def _buried_for_ever(points: int, depth: float) -> ValueError:
+def buried_for_ever(points: int, depth: float) -> ValueError:
+    """What is raised if points lie in a body and nothing says where they are to leave it."""
     return ValueError(
         f"slave_facets: {points} points lie in the body of master_facets from the start, about {depth:.3g} deep, and "
         "their normals do not meet its surface: let the bodies overlap less, or give all facets that face each other"
