@@ -16,6 +16,7 @@ from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.pair_heat import PairHeat
 from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.pairs.contact_surfaces import ContactSurfaces
@@ -299,6 +300,8 @@ def test_refusals():
         SurfacePair(b.state, faces, young=E, small_sliding=True)
     with pytest.raises(ValueError, match=r"friction.*closing=False"):
         b.crack(None, closing=False, friction=0.3)
+    with pytest.raises(ValueError, match=r"crack = 'crack'.*closing=True"):
+        CrackFriction(b.crack(None, closing=False), 0.3)
     with pytest.raises(ValueError, match="side"):
         crack.face("plus")
     with pytest.raises(ValueError, match="side"):

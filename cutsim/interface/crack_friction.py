@@ -26,6 +26,7 @@ class Faced(Protocol):
     points: FacetPoints
     contact: PenaltyContact
     faces: CrackFaces
+    closing: bool
 
     def surface(self, side: Literal["+", "-"]) -> Surface:
         """One face of it."""
@@ -69,6 +70,7 @@ class CrackFriction(Term):
     ) -> None:
         require("law", law, law is not None, "a friction law or a coefficient")
         check_friction("law", law)
+        require("crack", crack.name, crack.closing, "one with closing=True: a pair of its faces rubs itself")
         require_number("allowed_slip", allowed_slip, positive.or_none)
         if acts_on == "tension":
             words = f"{crack.name}: open faces rub (friction on 'tension'); use it for comparison only"
