@@ -23,6 +23,7 @@ from cutsim import (
     GeneralisedAlpha,
     NeoHookean,
     Ogden,
+    PathFollowing,
     Prony,
     StepControl,
     ThermoElastic,
@@ -191,6 +192,12 @@ def test_values_become_the_objects_of_cutsim(written):
     assert case.steps == StepControl(0.02, 0.1)
     assert case.mesh.set == {"Lx": 4, "H": 6, "lc": 0.2, "band": 0.4}
     assert case.bodies["body"].viscosity == 0.002
+
+
+def test_steps_may_follow_a_path(written):
+    case = read_case(written(BLADE), {"steps.path.facets": "2", "steps.path.onset": "0.5"})
+    assert case.steps == StepControl(0.02, 0.1, path=PathFollowing(2, 0.5))
+    assert "steps.path.facets" in refused(written(BLADE), {"steps.path.facets": "-1"})[0]
 
 
 def test_numbers_are_in_the_units_of_the_file(written):

@@ -130,7 +130,7 @@ def test_without_it_the_run_ends_there():
 def test_what_needs_time_is_not_followed():
     bar = Bar.build(pulled=True, viscosity=1e-9)
     assert "needs time" in bar.mechanics.path.obstacle
-    with pytest.raises(StepError):
+    with pytest.raises(StepError, match=r"path of equilibria is not followed: .* needs time"):
         bar.run(2.0, PathFollowing(onset=0.1), step=0.3)
 
 

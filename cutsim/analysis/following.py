@@ -27,6 +27,14 @@ def followable(problem: Problem, control: Control) -> tuple[Path, PathFollowing]
     return None if path is None or control.path.facets == 0 or path.obstacle else (path, control.path)
 
 
+def unfollowed(problem: Problem, control: Control) -> str:
+    """Where no step succeeds: why the path does not help, in words; empty if nothing can break. Collective."""
+    path = problem.path
+    if path is None or path.unit == 0 or control.path.facets == 0:
+        return ""
+    return f"The path of equilibria is not followed: {why}" if (why := path.obstacle) else "Nor does one along the path"
+
+
 def follow(problem: Problem, control: Control, corner: float) -> StepReport | None:
     """A trial step along the path that does not pass the corner; None if all fail, the shortest too. Collective."""
     found = followable(problem, control)

@@ -13,7 +13,7 @@ from typing import Literal
 
 from mpi4py import MPI
 
-from cutsim.analysis.following import follow, followable, pace_after
+from cutsim.analysis.following import follow, followable, pace_after, unfollowed
 from cutsim.analysis.steps import (
     FOLLOWING,
     Control,
@@ -40,6 +40,8 @@ logger = collective_logger(__name__)
 _SLIVER = 0.1
 # change of the audit's relative closure at which a predicted step is thought to have strayed to another equilibrium
 _STRAYED = 1e-3
+# part of its loss that a step may miss in the energy audit, beyond which it has jumped
+_JUMPED = 0.02
 # corners that differ by less than this fraction of the smallest step are one
 _ROUNDING = 1e-6
 # what the verdict says of a run that has not come to its end, until it goes on
@@ -210,7 +212,7 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
         size, cuts = control.next(tried), cuts + 1
         require("control.next(report)", size, size < tried.dt, f"less than {tried.dt:.6g} after a rejected step")
         logger.info("step to %.6g rejected (%s); next try %.3g", end, tried.refusal, size)
-        if not followed and (_limit(problem, control) or size < control.smallest):
+        if not followed and (size < control.smallest or _eager(problem, control)):
             followed = True
             if (along := follow(problem, control, corner)) is not None:
                 logger.info("from time %.6g the equilibrium path is followed", start)
@@ -240,11 +242,11 @@ def _accept(problem: Problem, report: StepReport, pace: Pace) -> StepReport:
 
 def _no_step(problem: Problem, control: Control, report: StepReport) -> StepError:
     """The end of a run in which no step succeeds."""
-    start, advice = problem.state.time_old, problem.advise()
+    start, advice = problem.state.time_old, [unfollowed(problem, control), problem.advise()]
     problem.state.verdict.suppose("ended", f"no step succeeds from time {start:.6g} on", aloud=True)
     return StepError(
         f"no step from time {start:.6g} of {report.dt:.3g} or more succeeds "
-        f"(smallest = {control.smallest:.3g}): {report.refusal}" + (f". {advice}" if advice else "")
+        f"(smallest = {control.smallest:.3g}): {report.refusal}" + "".join(f". {words}" for words in advice if words)
     )
 
 
@@ -269,20 +271,24 @@ def _attempt(problem: Problem, control: Control, end: float, *, predict: bool) -
     return tried
 
 
-def _limit(problem: Problem, control: Control) -> float:
-    """Largest loss of a step in time, beyond which the path is followed; 0 for no limit [energy]. Collective."""
-    found = followable(problem, control)
-    if found is None:
-        return 0.0
-    path, following = found
-    facets = following.onset or (following.facets if problem.state.pace.committed.turned else 0.0)
-    return facets * path.unit
+def _eager(problem: Problem, control: Control) -> bool:
+    """Whether the path is followed as soon as a step in time fails, and not after smaller ones only. Collective."""
+    wanted = control.path.onset is not None or problem.state.pace.committed.turned
+    return wanted and followable(problem, control) is not None
 
 
-def _jump(problem: Problem, control: Control, report: StepReport) -> str | None:
-    """Why a step in time has jumped over a turn of the path, in words, or None."""
-    limit = _limit(problem, control)
-    return f"it loses {report.lost:.3g}, more than {limit:.3g}" if limit and report.lost > limit else None
+def _jump(problem: Problem, control: Control, tried: StepReport) -> str | None:
+    """Why a step in time that was solved may have jumped over a turn of the path, in words, or None. Collective."""
+    if not _eager(problem, control) or problem.path is None:
+        return None
+    unit, following = problem.path.unit, control.path
+    if following.onset is not None:
+        limit = following.onset * unit
+        return f"it loses {tried.lost:.3g}, more than {limit:.3g}" if tried.lost > limit else None
+    missed = abs(problem.trial_audit.gap - problem.audit.gap)
+    if tried.lost > following.facets * unit and missed > _JUMPED * tried.lost:
+        return f"{missed / tried.lost:.1%} of what it loses is missing in the energy audit: it has jumped"
+    return None
 
 
 @contextmanager

@@ -136,7 +136,8 @@ class PathFollowing:
         facets: Largest loss of a step along the path, in units of the energy that breaks a facet of mean size; 0 for
             never: then a run ends where no step in time succeeds.
         onset: Largest loss of a step in time, in the same units; one that loses more is done anew along the path.
-            None: there is no limit until no step in time has succeeded once, and `facets` from then on.
+            None: there is no limit; but once the path had to be followed, as no step in time succeeded, a step in time
+            that has jumped, by its energy audit, is done anew as well.
 
     Raises:
         ValueError: A value is outside its range.

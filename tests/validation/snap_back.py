@@ -180,7 +180,7 @@ HALF, OVER, ARM = 50.4, 5.6, 2.25
 REEDER = {92.9: (126.6, 73.0), 41.3: (379.0, 218.0), 27.3: (725.2, 418.0)}
 
 
-def mixed(lever: float, comm: MPI.Comm = COMM, *, cells: int = 224) -> Body:
+def mixed(lever: float, comm: MPI.Comm = COMM, *, cells: int = 112) -> Body:
     """Mixed-mode bending under P = 100 N t, with a lever of a given length [mm], until the crack is far beyond L."""
     width, ghosts = 25.4, mesh.GhostMode.shared_facet
     corners = [(-OVER, -ARM), (2 * HALF + OVER, ARM)]
