@@ -9,10 +9,12 @@ from cutsim.base.memory import Memory
 from cutsim.pairs.configuration import Points
 from cutsim.pairs.outer_surface import Master, SlaveSurface
 from cutsim.pairs.pairing import Array, Hits, nearest
-from cutsim.pairs.search import PartnerSearch, buried_for_ever
+from cutsim.pairs.search import Found, PartnerSearch, buried_for_ever
 
 #: Distance behind a point that is none, as a fraction of the mean slave facet's size.
 BEHIND = 1e-6
+#: Cosine between the normals of two facets from which they cannot meet before partners are looked for anew.
+ALIKE = 0.9
 
 
 class FoldingSearch(PartnerSearch):
@@ -68,6 +70,14 @@ class FoldingSearch(PartnerSearch):
         hits = self._met(points, nodes, self._reach(nodes))
         hits = hits.some(self._entered(hits))
         return nearest(hits, hits.gap >= -self._touch)
+
+    def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float, version: int) -> Found:
+        """Find the facets that are near each other, without those that look the same way, as neighbours do."""
+        found = super()._look_around(points, nodes, reach, version)
+        slaves, masters = found.facets
+        ways = points.frames[:: self._count, 0][slaves], self._outward(nodes[1])[masters]
+        facing = np.einsum("ni,ni->n", *ways) < ALIKE
+        return replace(found, facets=(slaves[facing], masters[facing]))
 
     def _own(self, hits: Hits) -> NDArray[np.bool_]:
         """Which partners are on the body of their points."""

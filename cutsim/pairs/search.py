@@ -34,7 +34,7 @@ class _Known:
 
 
 @dataclass(frozen=True)
-class _Found:
+class Found:
     """Last search for facets that are near each other.
 
     Attributes:
@@ -167,13 +167,15 @@ class PartnerSearch:
         rows = np.flatnonzero(lost & np.repeat(self._slave.owned, self._count))
         if len(rows) and len(nodes[1]):
             distance, closest = cKDTree(nodes[1].mean(axis=1)).query(points.x[rows])
-            derivatives = self._master.shape.values(self._master.shape.centre[None])[1][0]
-            outward = self._master.sides[closest, None] * normals(
-                np.einsum("kb,nbi->nki", derivatives, nodes[1][closest])
-            )
-            facing = np.einsum("ni,ni->n", outward, points.frames[rows, 0]) / np.linalg.norm(outward, axis=1)
+            facing = np.einsum("ni,ni->n", self._outward(nodes[1])[closest], points.frames[rows, 0])
             depth[rows] = np.where(np.abs(facing) > FACING, distance, 0.0)
         return depth
+
+    def _outward(self, nodes: Array) -> Array:
+        """Outward unit normals in the middle of the facets of the master."""
+        derivatives = self._master.shape.values(self._master.shape.centre[None])[1][0]
+        outward = self._master.sides[:, None] * normals(np.einsum("kb,nbi->nki", derivatives, nodes))
+        return np.asarray(outward / np.linalg.norm(outward, axis=1, keepdims=True))
 
     def _reach(self, nodes: tuple[Array, Array]) -> float:
         """How far partners are looked for: points are as deep as they were, and as the bodies have moved since."""
@@ -209,12 +211,12 @@ class PartnerSearch:
         total = self._slave.maximum(float(np.nan_to_num(slave + master + farther, nan=np.inf)))
         return self._margin < total < WILD * self._margin
 
-    def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float, version: int) -> _Found:
+    def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float, version: int) -> Found:
         """Find the facets that are near each other."""
         ray = reach * points.frames[:, 0]
         shape = len(nodes[0]), self._count, points.x.shape[-1]
         rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
-        return _Found(near_facets(rays, nodes[1], self._margin), nodes, reach, version + 1)
+        return Found(near_facets(rays, nodes[1], self._margin), nodes, reach, version + 1)
 
 
 def buried_for_ever(points: int, depth: float) -> ValueError:
