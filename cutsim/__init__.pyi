@@ -6,10 +6,14 @@ from .analysis.steps import PathFollowing as PathFollowing
 from .analysis.steps import StepError as StepError
 from .analysis.steps import StepReport as StepReport
 from .bodies.body_force import BodyForce as BodyForce
-from .bodies.loads import NodalForce as NodalForce
 from .bodies.loads import Pressure as Pressure
 from .bodies.loads import Support as Support
 from .bodies.loads import Traction as Traction
+from .bodies.machine import Machine as Machine
+from .bodies.nodal_loads import LineLoad as LineLoad
+from .bodies.nodal_loads import NodalForce as NodalForce
+from .bodies.rigid_link import Attachment as Attachment
+from .bodies.rigid_link import RigidLink as RigidLink
 from .bodies.schemes import GeneralisedAlpha as GeneralisedAlpha
 from .bodies.schemes import Newmark as Newmark
 from .bodies.solid import Solid as Solid

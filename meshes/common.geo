@@ -32,7 +32,10 @@ Macro FromMouth
   largest = lc;
   Call Graded;
   near[] = ends[];
-  last = #near[] > 1 ? near[#near[] - 1] - near[#near[] - 2] : 1;
+  last = 1;
+  If (#near[] > 1) // gmsh reads both sides of a question mark
+    last = near[#near[] - 1] - near[#near[] - 2];
+  EndIf
   growth = outer;
   length = whole - inner;
   size = growth * inner * last;

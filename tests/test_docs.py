@@ -62,6 +62,14 @@ def test_friction():
     assert last["energy_friction"][0] > 0 and abs(last["energy_closure"][0]) < 1e-2
 
 
+def test_test_rigs():
+    page = run_page("test_rigs")
+    last = {name: value for name, (value, _) in page["rows"][-1].items()}
+    assert 0.2 - last["tool_drive_y"] == pytest.approx(last["tool_force_y"] / 0.5, rel=1e-6), "the page's machine lags"
+    last = {name: value for name, (value, _) in page["link_rows"][-1].items()}
+    assert abs(last["plate_rz"]) > 1e-3 and abs(last["plate_rz_moment"]) < 1e-8, "the page's plate turns freely"
+
+
 def test_large_sliding():
     page = run_page("large_sliding")
     last = {name: value for name, (value, _) in page["rows"][-1].items()}

@@ -13,7 +13,8 @@ from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl, begin
 from cutsim.base.assembly import integrate
 from cutsim.base.compat import form
-from cutsim.bodies.loads import NodalForce, Pressure, Support, Traction
+from cutsim.bodies.loads import Pressure, Support, Traction
+from cutsim.bodies.nodal_loads import NodalForce
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space

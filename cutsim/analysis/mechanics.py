@@ -66,7 +66,7 @@ class Mechanics(Balance[Term, Support]):
         supports: Prescribed displacements.
         observers: What watches the terms without adding to the balance; evaluated after them.
         analysis: "quasi-static" or "dynamic"; the latter adds the inertia of the solids, each of which needs a density.
-        scheme: Time integration of a dynamic analysis; the trapezoidal rule by default.
+        scheme: Time integration of a dynamic analysis, and of machines with a mass; the trapezoidal rule by default.
         mass: "consistent" or "lumped", see `cutsim.bodies.inertia`.
         petsc_options: PETSc options without prefix; they win over the presets.
         petsc_options_prefix: Prefix of all PETSc options of the problem, no other's; by default "cut_" for the first
@@ -100,7 +100,7 @@ class Mechanics(Balance[Term, Support]):
         require("terms", len(terms), len(terms) > 0, "at least one term")
         terms = with_companions(terms)
         self.supports, self._observers = tuple(supports), tuple(observers)
-        self.motion: Motion = QuasiStatic(state, terms)
+        self.motion: Motion = QuasiStatic(state, terms, scheme)
         if analysis == "dynamic":
             self.motion = Dynamic(Inertia(state, offering(terms, Body), scheme, mass), terms, supports)
         interfaces, size = offering(terms, Interface), extent(state.mesh.comm, state.mesh.geometry.x)
@@ -161,6 +161,7 @@ class Mechanics(Balance[Term, Support]):
         # at rest before the step, or at a corner
         self.state.jerks = not self._moved.committed or self.state.time_old in self.corners
         super().begin()
+        self.motion.begin()
         self.problem.known[:] = self.motion.known(self._residual.committed)
 
     def predict(self) -> None:
@@ -196,14 +197,14 @@ class Mechanics(Balance[Term, Support]):
         """Trial history, energies and reactions of the converged trial state. Collective."""
         for part in (*self.terms, *self._observers):
             part.evaluate()
-        old, supported = self._residual.committed, self.problem.supported
-        residual = self.motion.forces(self._out_of_balance(), old, supported)
+        old = self._residual.committed
+        residual = self.motion.forces(self._out_of_balance(), old, self.problem.carried)
         rates = [forces for t in offering(self.terms, RateDependent) if (forces := t.rate_forces()) is not None]
         rate_forces = np.sum([np.zeros_like(residual), *rates], axis=0)
         mean = 0.5 * (residual + old)
         if self.state.jerks:  # what follows the velocity has its value at the end of the step from its beginning on
             mean += 0.5 * (rate_forces - self._rate_forces.committed)
-        work = global_dot(self.state.mesh.comm, supported(mean), self.state.increment)
+        work = global_dot(self.state.mesh.comm, self.problem.supported(mean), self.state.increment)
         work += sum((t.external_work() for t in offering(self.terms, Loading)), start=0.0)
         self._residual.trial, self._rate_forces.trial, self._moved.trial = residual, rate_forces, True
         self._audit.trial = self.audit.advance(work, self._energies())

@@ -40,6 +40,13 @@ def resultant(comm: MPI.Comm, forces: NDArray[np.float64], gdim: int) -> Array:
     return np.asarray(comm.allreduce(forces.reshape(-1, gdim).sum(axis=0), op=MPI.SUM))
 
 
+def summed(comm: MPI.Comm, parts: NDArray[np.float64]) -> Array:
+    """Sum of the arrays of all ranks, of one shape. Collective."""
+    total = np.array(parts, dtype=float)
+    comm.Allreduce(MPI.IN_PLACE, total, op=MPI.SUM)
+    return total
+
+
 def box(comm: MPI.Comm, points: Array) -> tuple[Array, Array]:
     """Lowest and highest corner of the box around the points of all ranks, one a row [length]."""
     low, high = (np.array(pick(points, axis=0, initial=far)) for pick, far in ((np.min, np.inf), (np.max, -np.inf)))

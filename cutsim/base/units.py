@@ -28,6 +28,7 @@ DIMENSIONS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
         "moment": (1, 1, 0, 0),
         "angle": (0, 0, 0, 0),
         "velocity": (1, 0, -1, 0),
+        "angular velocity": (0, 0, -1, 0),
         "temperature": (0, 0, 0, 1),
         "power": (1, 1, -1, 0),
         "flux": (-1, 1, -1, 0),
@@ -36,6 +37,11 @@ DIMENSIONS: Mapping[str, tuple[int, int, int, int]] = MappingProxyType(
         "temperature difference": (0, 0, 0, 1),
         "acceleration": (1, 0, -2, 0),
         "force per volume": (-3, 1, 0, 0),
+        "force per length": (-1, 1, 0, 0),
+        "damping": (-1, 1, 1, 0),
+        "mass": (-1, 1, 2, 0),
+        "rotational damping": (1, 1, 1, 0),
+        "moment of inertia": (1, 1, 2, 0),
         "stiffness": (-3, 1, 0, 0),
         "viscosity": (-2, 1, 1, 0),
         "interface viscosity": (-3, 1, 1, 0),
@@ -54,7 +60,10 @@ KINDS = tuple(DIMENSIONS)
 _STRESS = {("mm", "N"): "MPa", ("m", "N"): "Pa", ("mm", "kN"): "GPa", ("m", "kN"): "kPa"}
 _ENERGY = {("mm", "N"): "mJ", ("m", "N"): "J", ("mm", "kN"): "J", ("m", "kN"): "kJ"}
 # what is per width in a plane problem
-_EXTENSIVE = ("force", "energy", "moment", "power", "entropy")
+_EXTENSIVE = (
+    "force", "energy", "moment", "power", "entropy", "force per length", "damping", "mass", "rotational damping",
+    "moment of inertia",
+)  # fmt: skip
 _POWERS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -101,6 +110,14 @@ Angle = Annotated[float, Kind("angle")]
 Velocity = Annotated[float, Kind("velocity")]
 TemperatureValue = Annotated[float, Kind("temperature")]
 TemperatureDifference = Annotated[float, Kind("temperature difference")]
+Force = Annotated[float, Kind("force")]
+Moment = Annotated[float, Kind("moment")]
+ForcePerLength = Annotated[float, Kind("force per length")]
+Damping = Annotated[float, Kind("damping")]
+TurnDamping = Annotated[float, Kind("rotational damping")]
+Mass = Annotated[float, Kind("mass")]
+Inertia = Annotated[float, Kind("moment of inertia")]
+AngularVelocity = Annotated[float, Kind("angular velocity")]
 Flux = Annotated[float, Kind("flux")]
 Stiffness = Annotated[float, Kind("stiffness")]
 Viscosity = Annotated[float, Kind("viscosity")]

@@ -1,4 +1,4 @@
-"""Supports, dead loads and pressure."""
+"""Supports, and loads on surfaces."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -7,7 +7,6 @@ import numpy as np
 import ufl
 from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from cutsim.base.assembly import global_dot, nodal_forces, resultant
 from cutsim.base.checks import count, require, require_number, require_numbers
@@ -17,7 +16,8 @@ from cutsim.base.parameters import Schedule, TimeFunction
 from cutsim.base.places import Places
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns, Term
-from cutsim.fields.space import locate_dofs
+from cutsim.fields.points import Surface
+from cutsim.fields.space import locate_dofs, locate_face_dofs
 from cutsim.fields.state import State
 
 # component of a direction over its length that is none
@@ -27,17 +27,18 @@ _STRAIGHT = 1e-12
 class Support:
     """Prescribed displacement along one direction on some facets (or vertices), with its reaction.
 
-    On a crack it holds all its sides. Several supports may hold the same node along the same component if they agree on
+    On facets of a crack it holds both faces, on one face of it, ``crack.surface("+")``, this face alone; both meet at a
+    front that ends inside a body. Several supports may hold the same node along the same component if they agree on
     its displacement at all times; its reaction then counts for the first of them that has a name.
 
     Args:
         state: Displacement and time.
-        entities: Local mesh entities.
+        entities: Local mesh entities, or a surface such as a face of a crack.
         component: Index of the displacement component, or the direction along which the displacement is prescribed and
             the reaction counted; its length does not matter.
         value: Displacement, a number or a function of time [length].
         name: Name in the history, None to leave the reaction out of it.
-        dim: Dimension of the entities; facets by default.
+        dim: Dimension of the entities; facets by default. A surface has that of facets.
         corners: Times at which the velocity jumps.
 
     Attributes:
@@ -57,7 +58,7 @@ class Support:
     def __init__(
         self,
         state: State,
-        entities: NDArray[np.int32],
+        entities: NDArray[np.int32] | Surface,
         component: int | tuple[float, ...],
         value: float | TimeFunction = 0.0,
         *,
@@ -75,7 +76,11 @@ class Support:
         self.component = int(np.argmax(self.direction)) if np.count_nonzero(self.direction) == 1 else None
         prescribed = value if self.sign > 0 else _opposite(value)
         self._value = Schedule(state.mesh, state.memory, prescribed, "value", name or "support")
-        self.nodes = locate_dofs(state.V, dim, entities)
+        if isinstance(entities, Surface):
+            require("dim", dim, dim == tdim - 1, f"None or {tdim - 1} for a surface")
+            self.nodes = locate_face_dofs(state.V, entities.entities)
+        else:
+            self.nodes = locate_dofs(state.V, dim, entities)
         found = state.mesh.comm.allreduce(np.count_nonzero(self.nodes < state.V.dofmap.index_map.size_local))
         require("entities", found, found > 0, f"entities that carry dofs (support {name!r})")
         self.dofs: NDArray[np.int32] = np.empty(0, dtype=np.int32)
@@ -297,86 +302,3 @@ class Pressure(SurfaceLoad):
     def _density(self) -> Expr:
         area = self._area_vector()
         return -ufl.as_vector([area[i] for i in range(self.state.mesh.geometry.dim)])
-
-
-class NodalForce(Load):
-    """The same dead force on each of some vertices.
-
-    The deformation under a force at a point depends on the mesh.  Where the vertices are those of a surface, a
-    `Traction` is a load that does not.
-
-    Args:
-        state: Displacement and time.
-        vertices: Local vertices.
-        direction: Force on each of them at factor 1, one number a component [force].
-        factor: Function of time that scales it.
-        name: Name in messages and output.
-        corners: Times at which the factor has a kink.
-
-    Raises:
-        ValueError: The direction has the wrong number of components, or no vertex is found on any rank.
-    """
-
-    @checked
-    def __init__(
-        self,
-        state: State,
-        vertices: NDArray[np.int32],
-        direction: tuple[float, ...],
-        factor: TimeFunction,
-        *,
-        name: str = "force",
-        corners: tuple[float, ...] = (),
-    ) -> None:
-        gdim = state.mesh.geometry.dim
-        require_numbers("direction", direction, length=gdim)
-        super().__init__(state, factor, "factor", name, corners)
-        self.nodes = locate_dofs(state.V, 0, vertices)
-        nodes = self.nodes[self.nodes < state.V.dofmap.index_map.size_local]
-        found = state.mesh.comm.allreduce(len(nodes))
-        require("vertices", found, found > 0, f"vertices that carry dofs (load {name!r})")
-        self._dofs = (gdim * nodes[:, None] + np.arange(gdim, dtype=np.int32)).ravel()
-        self._unit = np.tile(np.array(direction, dtype=float), len(nodes))
-        self._forces_on_vertices = _DeadForces(self)
-
-    @property
-    def assemblers(self) -> Sequence["_DeadForces"]:
-        """The forces."""
-        return (self._forces_on_vertices,)
-
-    def residual(self, v: Expr) -> ufl.Form:
-        """No form: the forces are those of the assembler."""
-        return ufl.Form([])
-
-    def forces(self) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-        """Owned dofs and the forces on them at the end of the step [force]."""
-        return self._dofs, self._factor.value * self._unit
-
-    def _nodal_forces(self) -> NDArray[np.float64]:
-        nodal = np.zeros(len(self.state.increment))
-        dofs, forces = self.forces()
-        nodal[dofs] = forces
-        return nodal
-
-
-class _DeadForces:
-    """The forces of a load on vertices, as `cutsim.base.terms.Assembler`; they have no tangent."""
-
-    pattern = 0
-
-    def __init__(self, load: NodalForce) -> None:
-        self._load = load
-
-    def prepare(self) -> None:
-        """Nothing depends on the displacement."""
-
-    def add_forces(self, b: PETSc.Vec, along: NDArray[np.float64] | None) -> None:
-        """Subtract the forces, which are external, see `cutsim.base.terms.Assembler.add_forces`."""
-        dofs, forces = self._load.forces()
-        b.setValues((b.getOwnershipRange()[0] + dofs).astype(PETSc.IntType), -forces, addv=PETSc.InsertMode.ADD)
-
-    def add_tangent(self, A: PETSc.Mat) -> None:
-        """Nothing."""
-
-    def add_pattern(self, A: PETSc.Mat) -> None:
-        """Nothing."""

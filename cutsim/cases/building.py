@@ -26,6 +26,7 @@ from cutsim.cases.interfaces import crack_friction, cracks, pairs
 from cutsim.cases.measures import Measure, measures, tool_measures
 from cutsim.cases.parts import Parts
 from cutsim.cases.refusals import refused, refusing
+from cutsim.cases.rigs import links
 from cutsim.cases.schema import CaseTables
 from cutsim.cases.tools import tools
 from cutsim.cases.validation import validated
@@ -159,8 +160,8 @@ def _general(domain: Domain) -> Simulation:
     joined, rigid = pairs(domain, bodies, faces), tools(domain, bodies, faces, value)
     parts = Parts(bodies, faces, rubbing, joined, {name: [tool] for name, tool in rigid.items()})
     touching = [*faces.values(), *rubbing.values(), *joined.values(), *rigid.values()]
-    terms = [*bodies, *touching, *loads(domain, state, bodies)]
-    held = supports(domain, state)
+    terms = [*bodies, *touching, *links(domain, state, faces), *loads(domain, state, bodies)]
+    held = supports(domain, state, faces)
     with refusing(domain.document):
         mechanics = Mechanics(state, terms, held, **_mechanics_options(domain))
     problem = mechanics if value is None else coupled(domain, mechanics, parts, value)
@@ -223,7 +224,7 @@ def _end(domain: Domain) -> float:
 
 
 def _curve(domain: Domain, rigid: Mapping[str, Any]) -> tuple[str, str]:
-    """Columns that tell most of a problem of named parts: of its first tool, or of the first support that moves."""
+    """Columns that tell most of a problem of named parts: of its first tool, or of what moves first."""
     if rigid:
         name = next(iter(rigid))
         return f"{name}_travel", f"{name}_resistance"
@@ -231,6 +232,10 @@ def _curve(domain: Domain, rigid: Mapping[str, Any]) -> tuple[str, str]:
         if table.value != 0.0:
             axis = "_x" if table.direction == "all" else ""
             return f"{name}{axis}_displacement", f"{name}{axis}_force"
+    for name, link in domain.tables.links.items():
+        for coordinate, value in link.motion.items():
+            if value != 0.0:
+                return f"{name}_{coordinate}", f"{name}_{coordinate}_{'moment' if coordinate[0] == 'r' else 'force'}"
     return "time", "work_external"
 
 

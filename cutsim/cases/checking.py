@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from cutsim.analysis.steps import begin
 from cutsim.cases.building import Simulation
-from cutsim.cases.sizes import element_sizes, kind_of_cells
+from cutsim.cases.sizes import element_sizes, group_area, kind_of_cells
 from cutsim.fields.sizes import facet_size
 from cutsim.interface.cohesive import process_zone_element
 from cutsim.interface.crack import Crack
@@ -86,7 +86,11 @@ def _mesh(simulation: Simulation) -> Iterator[Finding]:
     for (dim, name), entities in simulation.domain.groups.items():
         owned = entities < mesh.topology.index_map(dim).size_local
         number = mesh.comm.allreduce(int(np.count_nonzero(owned)))
-        yield Finding("groups", name, f"{number} {kinds.get(dim, 'entities')}")
+        words = f"{number} {kinds.get(dim, 'entities')}"
+        if dim == tdim - 1:
+            kind, size = group_area(simulation, name)
+            words += f", {kind} {size:.6g} {units.of(kind)}"
+        yield Finding("groups", name, words)
 
 
 def _bodies(simulation: Simulation) -> Iterator[Finding]:

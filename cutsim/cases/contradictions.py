@@ -48,8 +48,14 @@ def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
         yield (*key, "position"), tool.position
         yield from (((*key, "path", "points", i), p) for i, p in enumerate(getattr(path, "points", ())))
         yield from (((*key, "path", part), getattr(path, part, None)) for part in _MOTIONS)
+        yield from (((*key, "machines", i, "axis"), machine.axis) for i, machine in enumerate(tool.machines))
         for part in getattr(type(tool.made), "directions", ()):
             yield (*key, part), getattr(tool, part)
+    for name, link in valid.get("links", {}).items():
+        yield ("links", name, "reference"), link.reference
+        for part, place in link.attachments.items():
+            where = ("links", name, "attachments", part, "points")
+            yield from (((*where, i), point) for i, point in enumerate(place.points))
     for table in ("supports", "loads"):
         for name, entry in valid.get(table, {}).items():
             yield (table, name, "direction"), getattr(entry, "direction", None)
@@ -109,7 +115,7 @@ def _insertion(valid: Mapping[str, Any]) -> Iterator[Problem]:
     insertion = valid["insertion"]
     if insertion is None:
         return
-    for table in ("cracks", "pairs", "supports", "loads"):
+    for table in ("cracks", "pairs", "supports", "links", "loads"):
         if valid[table]:
             yield (table,), "not allowed beside [insertion], which makes its own", None
     tool = valid["tools"].get(insertion.tool)
@@ -152,6 +158,8 @@ def _tools(valid: Mapping[str, Any]) -> Iterator[Problem]:
         if name == inserted:
             if moved or tool.rotation is not None or tool.surfaces:
                 yield ("tools", name), "must have no surfaces and no motion: [insertion] gives them", None
+            if tool.machines:
+                yield ("tools", name, "machines"), "not allowed: [insertion] moves the tool", None
             continue
         if not tool.surfaces:
             yield ("tools", name, "surfaces"), "missing, must be given: what the tool can touch", None

@@ -1,33 +1,43 @@
 """Supports and loads of a case."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 
 from cutsim.bodies.body_force import BodyForce
-from cutsim.bodies.loads import Load, NodalForce, Pressure, Support, Traction
+from cutsim.bodies.loads import Load, Pressure, Support, Traction
+from cutsim.bodies.nodal_loads import LineLoad, NodalForce
 from cutsim.bodies.solid import Solid
 from cutsim.cases import schema_parts as schema
 from cutsim.cases.domains import Domain, Entities
 from cutsim.cases.expressions import TimeValue, corners_of
 from cutsim.cases.keys import Keys
 from cutsim.cases.refusals import refusing
-from cutsim.cases.tools import function
+from cutsim.cases.rigs import function, place
 from cutsim.fields.state import State
+from cutsim.interface.crack import Crack
 
 
-def supports(domain: Domain, state: State) -> list[Support]:
+def supports(domain: Domain, state: State, cracks: Mapping[str, Crack]) -> list[Support]:
     """Supports of a case, with a reaction by the name of each; those of all components as name_x and so on. Collective.
+
+    Args:
+        domain: The mesh of the case.
+        state: Displacement and time.
+        cracks: Its cracks by name.
 
     Raises:
         CaseError: A group or vertex is missing, or a support refuses a parameter.
     """
-    return [s for name, table in domain.tables.supports.items() for s in _supports(domain, state, name, table)]
+    tables = domain.tables.supports.items()
+    return [s for name, table in tables for s in _supports(domain, state, name, table, cracks)]
 
 
-def _supports(domain: Domain, state: State, name: str, table: schema.Support) -> Iterator[Support]:
-    dim, entities = _held(domain, ("supports", name), table)
+def _supports(
+    domain: Domain, state: State, name: str, table: schema.Support, cracks: Mapping[str, Crack]
+) -> Iterator[Support]:
+    dim, entities = place(domain, ("supports", name), table, cracks)
     gdim, corners = state.mesh.geometry.dim, _corners(table.corners, table.value)
     with refusing(domain.document, "supports", name):
         if table.direction == "all":
@@ -39,18 +49,8 @@ def _supports(domain: Domain, state: State, name: str, table: schema.Support) ->
         yield Support(state, entities, along, table.value, name=name, dim=dim, corners=corners)
 
 
-def _held(domain: Domain, key: Keys, table: schema.Support) -> tuple[int, Entities]:
-    """Dimension and local entities that a support holds. Collective."""
-    tdim = domain.tagged.mesh.topology.dim
-    if table.points or table.vertices:
-        return 0, _vertices(domain, key, table)
-    if table.cells:
-        return tdim, domain.cells((*key, "cells"), table.cells)
-    return tdim - 1, domain.facets((*key, "facets"), table.facets)
-
-
-def _vertices(domain: Domain, key: Keys, table: schema.Support | schema.NodalForce) -> Entities:
-    if table.points:
+def _vertices(domain: Domain, key: Keys, table: schema.NodalForce | schema.LineLoad) -> Entities:
+    if isinstance(table, schema.NodalForce) and table.points:
         return domain.nearest((*key, "points"), table.points)
     return domain.vertices((*key, "vertices"), table.vertices)
 
@@ -90,14 +90,18 @@ def _body_forces(
 
 
 def _load(
-    domain: Domain, state: State, name: str, table: schema.Pressure | schema.Traction | schema.NodalForce
+    domain: Domain,
+    state: State,
+    name: str,
+    table: schema.Pressure | schema.Traction | schema.NodalForce | schema.LineLoad,
 ) -> Load:
     key, corners, value = ("loads", name), _corners(table.corners, table.value), function(table.value)
-    if isinstance(table, schema.NodalForce):
+    if isinstance(table, schema.NodalForce | schema.LineLoad):
         vertices = _vertices(domain, key, table)
+        kind = NodalForce if isinstance(table, schema.NodalForce) else LineLoad
         with refusing(domain.document, *key):
             along = direction(table.direction, state.mesh.geometry.dim)
-            return NodalForce(state, vertices, along, value, name=name, corners=corners)
+            return kind(state, vertices, along, value, name=name, corners=corners)
     facets = domain.facets((*key, "facets"), table.facets)
     with refusing(domain.document, *key):
         if isinstance(table, schema.Pressure):

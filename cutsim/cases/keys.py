@@ -12,6 +12,7 @@ SINGULAR = {
     "pair": "pairs",
     "tool": "tools",
     "support": "supports",
+    "link": "links",
     "load": "loads",
     "boundary": "boundaries",
 }

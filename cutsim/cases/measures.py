@@ -62,13 +62,13 @@ def tool_measures(tools: Mapping[str, RigidTool], until: float) -> dict[str, Mea
 
 
 def _direction(tool: RigidTool, until: float) -> Array:
-    """Unit vector along which a tool first moves, zero if it does not."""
+    """Unit vector along which the path of a tool first moves, or a machine pushes it; zero if neither."""
     start = tool.path.position(0.0)
     for time in np.linspace(0.0, until, _SAMPLES):
         way = tool.path.position(time) - start
         if size := np.linalg.norm(way):
             return np.asarray(way / size)
-    return np.zeros_like(start)
+    return tool.heading
 
 
 def _travel(tool: RigidTool, start: Array, along: Array) -> float:

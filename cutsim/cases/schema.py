@@ -12,6 +12,7 @@ from cutsim.cases.schema_heat import Heat
 from cutsim.cases.schema_materials import AnyMaterial, Law
 from cutsim.cases.schema_mesh import Mesh, Selection
 from cutsim.cases.schema_parts import AnyTool, Body, Crack, Layer, Load, Pair, Support
+from cutsim.cases.schema_rigs import Link
 from cutsim.cases.schema_run import Analysis, AnyInsertion, Measure, Output, Solver, Steps
 from cutsim.cases.tables import Table, Varying
 from cutsim.interface.cohesive import CohesiveLaw
@@ -60,6 +61,7 @@ class Parts(Table):
         tools: Rigid tools by name.
         insertion: Insertion of a blade or needle along a crack, ready-made: cracks, supports and motion follow.
         supports: Prescribed displacements by name.
+        links: Rigid parts of a test rig by name: plates that may turn, pins, levers.
         loads: Loads by name.
         heat: Heat.
     """
@@ -75,6 +77,7 @@ class Parts(Table):
     tools: dict[Named, AnyTool] = Field(default_factory=dict)
     insertion: AnyInsertion | None = None
     supports: dict[Named, Support] = Field(default_factory=dict)
+    links: dict[Named, Link] = Field(default_factory=dict)
     loads: dict[Named, Load] = Field(default_factory=dict)
     heat: Heat | None = None
 

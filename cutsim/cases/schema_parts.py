@@ -11,6 +11,7 @@ from cutsim.cases.expressions import TimeValue
 from cutsim.cases.names import BodyNames, ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
 from cutsim.cases.schema_motion import Motion, Rotation
+from cutsim.cases.schema_rigs import Machines, Place
 from cutsim.cases.tables import FORM, NONNEGATIVE, POSITIVE, Flag, Table, Varying, chosen_by
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
@@ -157,6 +158,8 @@ class Tool(Constructed):
             [length].
         allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
             [length].
+        machines: What drives it along some axes, one machine or several: its motion there is found, and its path is
+            that of the machine. Not for an inserted tool; a tool of triangles is not turned by them.
     """
 
     friction: Annotated[Friction, NONNEGATIVE] = 0.0
@@ -168,6 +171,7 @@ class Tool(Constructed):
     contact: Contact | None = None
     allowed_penetration: Annotated[Length, POSITIVE] | None = None
     allowed_slip: Annotated[Length, POSITIVE] | None = None
+    machines: Machines = ()
 
     @property
     def pointed(self) -> bool:
@@ -202,33 +206,19 @@ AnyTool = Annotated[
 ]
 
 
-class Support(Table):
+class Support(Place):
     """Prescribed displacement along one direction, with its reaction.
 
     Args:
-        facets: Groups of facets that it holds.
-        cells: Groups of cells that it holds.
-        vertices: Groups of vertices that it holds.
-        points: Points of which it holds the nearest vertices [length].
         direction: Along which the displacement is prescribed: "x", "-x" and so on, a vector, or "all" for each
             component. The reaction counts along it.
         value: Displacement [length].
         corners: Times at which its velocity jumps; those of a table are known [time].
     """
 
-    facets: Groups = ()
-    cells: Groups = ()
-    vertices: Groups = ()
-    points: tuple[tuple[Length, ...], ...] = ()
     direction: AnyDirection
     value: Displacement = 0.0
     corners: tuple[Time, ...] = ()
-
-    @model_validator(mode="after")
-    def _one_place(self) -> "Support":
-        if sum(map(bool, (self.facets, self.cells, self.vertices, self.points))) != 1:
-            raise ValueError("must have one of facets, cells, vertices and points")
-        return self
 
 
 class Pressure(Table):
@@ -290,6 +280,23 @@ class NodalForce(Table):
         return self
 
 
+class LineLoad(Table):
+    """Force per length along a line of edges in space.
+
+    Args:
+        vertices: Groups of vertices of the line, such as a physical curve of gmsh; the edges between them are loaded.
+        direction: Direction of the force: "x", "y", "z", or a vector, whose length does not matter.
+        value: Force per length along the direction [force/length].
+        corners: Times at which it has a kink; those of a table are known [time].
+    """
+
+    kind: Literal["line"]
+    vertices: Groups
+    direction: Direction
+    value: Annotated[TimeValue, Varying("force per length")]
+    corners: tuple[Time, ...] = ()
+
+
 class BodyForce(Table):
     """Force on all of a body per reference volume; a dead load.
 
@@ -325,7 +332,7 @@ class Weight(Table):
 
 
 Load = Annotated[
-    Pressure | Traction | NodalForce | BodyForce | Weight,
+    Pressure | Traction | NodalForce | LineLoad | BodyForce | Weight,
     Field(discriminator="kind"),
-    chosen_by("kind", ["pressure", "traction", "force", "body-force", "weight"]),
+    chosen_by("kind", ["pressure", "traction", "force", "line", "body-force", "weight"]),
 ]

@@ -10,7 +10,7 @@ _PLURALS = {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra"}
 
 
 def mesh_sizes(simulation: Simulation) -> dict[str, str | int | float]:
-    """Sizes of the mesh and of the elements along each crack, by what they are in words. Collective."""
+    """Sizes of the mesh, its groups of facets and the elements along cracks, by their names in words. Collective."""
     mesh, units = simulation.problem.state.mesh, simulation.units
     smallest, largest = element_sizes(mesh)
     sizes: dict[str, str | int | float] = {
@@ -19,8 +19,18 @@ def mesh_sizes(simulation: Simulation) -> dict[str, str | int | float]:
         units.label("smallest element", "length"): smallest,
         units.label("largest element", "length"): largest,
     }
+    for dim, name in simulation.domain.groups:
+        if dim == mesh.topology.dim - 1:
+            kind, size = group_area(simulation, name)
+            sizes[units.label(f"{kind} of {name}", kind)] = size
     cracks = simulation.parts.cracks.items()
     return sizes | {units.label(f"elements along {name}", "length"): crack.size for name, crack in cracks}
+
+
+def group_area(simulation: Simulation, name: str) -> tuple[str, float]:
+    """What the measure of a group of facets is, "length" or "area", and how much [length or area]. Collective."""
+    state = simulation.problem.state
+    return state.facet_measure, simulation.domain.area(name, axisymmetric=state.axisymmetric)
 
 
 def kind_of_cells(simulation: Simulation) -> str:

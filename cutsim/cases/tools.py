@@ -1,8 +1,7 @@
 """Rigid tools of a case."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from cutsim.cases.domains import Domain
 from cutsim.cases.expressions import TimeValue, corners_of
 from cutsim.cases.keys import Keys
 from cutsim.cases.refusals import refusing
+from cutsim.cases.rigs import face_of, function, machines
 from cutsim.fields.points import Surface
 from cutsim.fields.sizes import normal_size
 from cutsim.fields.state import State
@@ -70,6 +70,7 @@ def _shaped(
             allowed_slip=table.allowed_slip,
             temperature=temperature,
             name=name,
+            machines=machines(table.machines),
         )
 
 
@@ -90,16 +91,16 @@ def _triangulated(domain: Domain, solids: tuple[Solid, ...], name: str, table: s
             allowed_penetration=table.allowed_penetration,
             allowed_slip=table.allowed_slip,
             search=table.search,
+            machines=machines(table.machines),
             name=name,
         )
 
 
 def _surface(domain: Domain, state: State, key: Keys, name: str, cracks: Mapping[str, Crack]) -> Surface:
     """A group of outer facets, or a face of a crack by its name with + or −."""
-    crack, face = cracks.get(name[:-1]), name[-1]
-    if crack is not None and face in "+-":
-        side: Literal["+", "-"] = "+" if face == "+" else "-"
-        return crack.surface(side)
+    face = face_of(name, cracks)
+    if face is not None:
+        return face
     facets = domain.facets(key, [name])
     with refusing(domain.document, *key):
         return Surface.exterior(state, facets)
@@ -134,8 +135,3 @@ def path_of(table: schema.Tool) -> ToolPath:
 
 def _corners(values: tuple[TimeValue, ...]) -> tuple[float, ...]:
     return tuple(corner for value in values for corner in corners_of(value))
-
-
-def function(value: TimeValue) -> Callable[[float], float]:
-    """A function of time for what is one, or a number."""
-    return value if callable(value) else lambda _: value

@@ -17,6 +17,7 @@ from cutsim.base.assembly import box
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import create_mesh
 from cutsim.base.signatures import checked
+from cutsim.fields.areas import area
 from cutsim.fields.cells import check_cells
 from cutsim.fields.refinement import Refinement, refined
 from cutsim.readers import formats, gmsh_model
@@ -85,6 +86,18 @@ class TaggedMesh:
             ValueError: If no group of facets has this name.
         """
         return self._find(name, self.mesh.topology.dim - 1)
+
+    def area(self, name: str, *, axisymmetric: bool = False) -> float:
+        """Length in the plane, or area in space, of a group of facets [length or area]. Collective.
+
+        Args:
+            name: The group; its facets may be outer or inner ones.
+            axisymmetric: Whether the mesh is a meridian plane: the area is then that of the surface of revolution.
+
+        Raises:
+            ValueError: If no group of facets has this name.
+        """
+        return area(self.mesh, self.facets(name), axisymmetric=axisymmetric)
 
     def with_group(self, name: str, dim: int, entities: NDArray[np.int32]) -> TaggedMesh:
         """This mesh with one more group, which its tags do not show.

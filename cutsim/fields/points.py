@@ -224,6 +224,12 @@ class Surface:
         """Measure over the surface in the reference configuration."""
         return self.points.measure
 
+    @property
+    def entities(self) -> NDArray[np.int32]:
+        """Rows (cell, local facet) of the facets that this rank integrates over."""
+        rows = dict(self.measure.subdomain_data())[self.measure.subdomain_id()].reshape(-1, 4 if self.side else 2)
+        return np.asarray(rows[:, 2:] if self.side == "-" else rows[:, :2])
+
     def restrict(self, f: Expr) -> Expr:
         """Restriction of a field of the body to the side."""
         return f if self.side is None else f(self.side)

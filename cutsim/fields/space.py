@@ -163,6 +163,24 @@ def locate_dofs(V: fem.FunctionSpace, dim: int, entities: NDArray[np.int32]) -> 
     return np.flatnonzero(sum_over_ranks(dofmap.index_map, found)).astype(np.int32)
 
 
+def locate_face_dofs(V: fem.FunctionSpace, entities: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Dofs on facets as the cells on one side see them: those of one face of a crack. Collective.
+
+    Args:
+        V: The space, cracked or not.
+        entities: Rows (cell, local facet), each on one rank (`cutsim.fields.points.Surface.entities`).
+
+    Returns:
+        Local dofs (blocks), ghosts included, ascending.
+    """
+    dofmap, fdim = V.dofmap, V.mesh.topology.dim - 1
+    facets = cpp.mesh.cell_num_entities(V.mesh.topology.cell_type, fdim)
+    closure = np.array([dofmap.dof_layout.entity_closure_dofs(fdim, i) for i in range(facets)])
+    found = np.zeros(dofmap.index_map.size_local + dofmap.index_map.num_ghosts, dtype=np.int32)
+    found[dofmap.list[entities[:, :1], closure[entities[:, 1]]]] = 1
+    return np.flatnonzero(sum_over_ranks(dofmap.index_map, found)).astype(np.int32)
+
+
 # --- the crack in the mesh ---
 
 

@@ -20,7 +20,8 @@ from cutsim.base.arrays import Array
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Bonded, Joining, offering
 from cutsim.base.units import Units
-from cutsim.bodies.loads import NodalForce, Support, SurfaceLoad
+from cutsim.bodies.loads import Support, SurfaceLoad
+from cutsim.bodies.nodal_loads import NodalLoad
 from cutsim.bodies.solid import Solid
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.state import State
@@ -141,7 +142,7 @@ def _symbol(support: Support) -> str:
 def _loaded(problem: Problem) -> Iterator[tuple[str, NDArray[np.int32]]]:
     V = problem.state.V
     for term in problem.terms:
-        if isinstance(term, SurfaceLoad | NodalForce):
+        if isinstance(term, SurfaceLoad | NodalLoad):
             yield term.name, term.nodes
         elif isinstance(term, Joining):
             for facets, side in zip(term.facets, ("slave", "master"), strict=False):

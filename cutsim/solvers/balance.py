@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.places import Places
-from cutsim.base.terms import Columns, Constrained, Diagnosing, Showing, Term, offering
+from cutsim.base.terms import Bordered, Columns, Constrained, Diagnosing, Showing, Term, offering
 from cutsim.fields.constraints import Constraints, Prescribed
 from cutsim.fields.state import State
 from cutsim.solvers.directions import Directions, Guided
@@ -100,6 +100,7 @@ class Balance(Generic[T, H]):
                 symmetric=all(t.symmetric for t in terms),
                 assemblers=[a for t in terms for a in t.assemblers],
                 multipliers=[m for t in offering(terms, Constrained) for m in t.multipliers],
+                borders=[b for t in offering(terms, Bordered) if (b := t.border) is not None],
                 interface_dofs=interface_dofs,
                 directions=directions,
             ),

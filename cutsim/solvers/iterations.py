@@ -189,8 +189,7 @@ class Iterations:
     def _check_step(self, x: PETSc.Vec, y: PETSc.Vec) -> bool:
         """Called by SNES after the linear solve: make the step of the constrained dofs exact."""
         # the linear solver meets these rows within its tolerance only, and what is left would be lifted again
-        forces = self._system.forces
-        y.array[forces.held] = forces.violation(x.array_r)
+        y.array[self._system.held] = self._system.violation(x.array_r)
         self.measures.note_direction(y.array_r, self.snes.getFunction()[0].array_r)
         self.linear.observe()
         return True

@@ -75,7 +75,7 @@ class LinearSolver:
             system.comm.size,
             structure.interface_dofs is not None,
             system.V.mesh.geometry.dim,
-            saddle_point=bool(structure.multipliers),
+            saddle_point=bool(structure.multipliers or structure.borders),
         )
 
     def _fallback(self) -> Preset | None:

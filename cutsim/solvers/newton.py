@@ -192,6 +192,18 @@ class NonlinearProblem:
         """The part of owned nodal vectors, one a row, along what is prescribed: zero where nothing is."""
         return self._system.supported(v)
 
+    def carried(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The part of owned nodal vectors, one a row, that supports or rigid bodies carry."""
+        return self._system.carried(v)
+
+    def restrained(self, motions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The part of owned motions, one a row, that supports or rigid bodies hold. Collective."""
+        return self._system.restrained(motions)
+
+    def free(self) -> str | None:
+        """A motion of a rigid body that nothing resists at the committed state, in words, or None. Collective."""
+        return self._system.free()
+
     def resistance(self, motions: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
         """Forces against motions by the tangent at the present u, without any Dirichlet condition. Collective.
 

@@ -19,7 +19,7 @@ class Norms:
 
     def __init__(self, system: System) -> None:
         self._system = system
-        self._free = np.setdiff1d(np.arange(len(system.unknowns)), system.forces.held)
+        self._free = np.setdiff1d(np.arange(len(system.unknowns)), system.held)
         self.start(system.unknowns)
 
     def start(self, x: NDArray[np.float64]) -> None:
@@ -49,7 +49,7 @@ class Norms:
         *sums, work, first_work = system.comm.allreduce(np.array(local)).tolist()
         norms = [sqrt(total) for total in sums]
         jump, size = (
-            float(system.comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX)) for v in (f[system.forces.held], x)
+            float(system.comm.allreduce(np.max(np.abs(v), initial=0.0), MPI.MAX)) for v in (f[system.held], x)
         )
         return Iterate(
             free=norms[0], reaction=norms[1], stiffness=norms[2], size=size, jump=jump, step=norms[3], way=norms[4],

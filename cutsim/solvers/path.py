@@ -176,7 +176,7 @@ class PathIterations:
 
     def _solve(self, b: Array, *, observe: bool = False) -> Array | None:
         """Solution y of A y = −b, exact where something is prescribed; None if the linear solver fails."""
-        snes, linear, held = self._iterations.snes, self._iterations.linear, self._system.forces.held
+        snes, linear, held = self._iterations.snes, self._iterations.linear, self._system.held
         A = snes.getJacobian()[0]
         while True:
             ksp = snes.getKSP()

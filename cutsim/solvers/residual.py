@@ -102,7 +102,7 @@ class Residual:
             self._add_assembled(lift)
         return r[: self.n]
 
-    def _increment(self) -> Array:
+    def increment(self) -> Array:
         """Owned increments to the prescribed values, components of space."""
         jump = np.zeros(self.n)
         jump[self.held] = -self._present_violation()
@@ -113,7 +113,7 @@ class Residual:
         jump = None
         if lift:
             jump = self._lifted.array
-            jump[: self.n] = self._increment()
+            jump[: self.n] = self.increment()
             self._lifted.scatter_forward()
         self._added.set(0.0)
         for assembler in self._assemblers:

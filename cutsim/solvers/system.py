@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base import compat
-from cutsim.base.terms import Assembler, Multiplier
+from cutsim.base.terms import Assembler, Border, Multiplier
+from cutsim.solvers.borders import Borders
 from cutsim.solvers.directions import Directions
 from cutsim.solvers.multipliers import Multipliers
 from cutsim.solvers.residual import Residual
@@ -26,6 +27,7 @@ class Structure:
         symmetric: Whether the tangent is symmetric.
         assemblers: Forces that are not in the form.
         multipliers: Further unknowns, on which the form depends, with their equations.
+        borders: A few unknowns more, with their equations, to which displacements may be tied.
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
         directions: What is prescribed along directions that are no components.
     """
@@ -33,6 +35,7 @@ class Structure:
     symmetric: bool = False
     assemblers: Sequence[Assembler] = ()
     multipliers: Sequence[Multiplier] = ()
+    borders: Sequence[Border] = ()
     interface_dofs: NDArray[np.int32] | None = None
     directions: Directions | None = None
 
@@ -42,10 +45,10 @@ STRUCTURE = Structure()
 
 
 class System:
-    """Forces on the displacement and equations of multipliers. Every method is collective.
+    """Forces on the displacement, equations of multipliers and borders. Every method is collective.
 
     The vector of unknowns is that of PETSc's iterations and not that of u, which line searches would spoil as their own
-    start: the displacement comes first, along the axes of the nodes, then the multipliers.
+    start: the displacement comes first, along the axes of the nodes, then the multipliers, then borders.
 
     Args:
         F: Residual, linear in a test function of the space of u.
@@ -60,7 +63,8 @@ class System:
         directions: Axes of nodes.
         structure: As above.
         size: Global number of unknowns.
-        reaction: Forces of the supports at the last residual, owned entries.
+        held: Owned unknowns that are prescribed.
+        reaction: Forces of the supports, and those that drive rigid bodies, at the last residual, owned entries.
     """
 
     def __init__(
@@ -78,7 +82,10 @@ class System:
         self.forces = Residual(L, a, u, bcs, structure.assemblers, self.directions)
         self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers, self.directions)
         self._multipliers = Multipliers(structure.multipliers, u, bcs, self.directions)
+        self._borders = Borders(structure.borders, self.comm, self.forces.fixed)
+        self._start = self.forces.n + len(self._multipliers.values)
         self.size = int(self.comm.allreduce(len(self.unknowns)))
+        self.held = np.concatenate([self.forces.held, self._start + self._borders.held])
         self.reaction: NDArray[np.float64] = np.zeros(len(self.forces.held))
 
     @property
@@ -95,18 +102,25 @@ class System:
     @property
     def unknowns(self) -> NDArray[np.float64]:
         """A copy of the owned unknowns."""
-        return np.concatenate([self.directions.turn(self._u.x.array[: self.forces.n]), self._multipliers.values])
+        u = self.directions.turn(self._u.x.array[: self.forces.n])
+        return np.concatenate([u, self._multipliers.values, self._borders.values])
 
     def assign(self, x: NDArray[np.float64]) -> None:
         """Set the unknowns, ghosts included."""
         n = self.forces.n
         self._u.x.array[:n] = self.directions.back(x[:n])
+        self._borders.assign(x[self._start :], self._u.x.array[:n])
         self._u.x.scatter_forward()
-        self._multipliers.assign(x[n:])
+        self._multipliers.assign(x[n : self._start])
+
+    def violation(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Unknowns minus prescribed values, of those that are `held`."""
+        return np.concatenate([self.forces.violation(x), self._borders.violation(x[self._start :])])
 
     def matrix(self) -> PETSc.Mat:
         """The matrix that `assemble_tangent` fills, which belongs to the system."""
-        return self._multipliers.around(self.tangent.A, symmetric=self.structure.symmetric)
+        K, symmetric = self.tangent.A, self.structure.symmetric
+        return self._borders.around(self._multipliers.around(K, symmetric=symmetric), K, symmetric=symmetric)
 
     def residual(self, x: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
         """Owned forces and equations at x; the prescribed values' violation in the constrained rows.
@@ -117,10 +131,13 @@ class System:
         """
         self.assign(x)
         lift = self.forces.violated(tolerance)
-        b = np.concatenate([self.forces.assemble(lift=lift), self._multipliers.residual()])
+        forces = self.forces.assemble(lift=lift)
+        equations = self._borders.residual(forces, self.forces.increment if lift else None)
+        b = np.concatenate([forces, self._multipliers.residual(), equations])
         # While prescribed values do not hold, these rows carry lifting too; but then u is no solution either.
-        self.reaction = b[self.forces.held]
-        b[self.forces.held] = self.forces.violation(x)
+        self.reaction = np.concatenate([b[self.forces.held], self._borders.loads])
+        b[self.held] = self.violation(x)
+        b[self._borders.tied] = 0.0
         return b
 
     def assemble_tangent(self, x: NDArray[np.float64]) -> None:
@@ -129,6 +146,7 @@ class System:
         self._prepare()
         self.tangent.assemble(self._bcs)
         self._multipliers.assemble()
+        self._borders.assemble(self.tangent.A, self.directions.turn)
 
     def _prepare(self) -> None:
         for assembler in self.structure.assemblers:
@@ -154,6 +172,20 @@ class System:
         """The part of owned nodal vectors along what is prescribed, one a row."""
         return self.directions.back(np.where(self.forces.fixed, self.directions.turn(v), 0.0))
 
+    def carried(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The part of owned nodal vectors, one a row, that supports or rigid bodies carry."""
+        carried = self.supported(v)
+        carried[..., self._borders.tied] = v[..., self._borders.tied]
+        return carried
+
+    def restrained(self, motions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The part of owned motions, one a row, that supports or rigid bodies hold."""
+        return self.supported(motions) + self._borders.restrained(motions)
+
+    def free(self) -> str | None:
+        """A motion of a rigid body that nothing resists at the committed state, in words, or None."""
+        return self._borders.free()
+
     def cell_size(self) -> float:
         """Size of the largest cell [length]."""
         mesh = self.V.mesh
@@ -163,5 +195,5 @@ class System:
 
     def destroy(self) -> None:
         """Free the PETSc objects."""
-        for thing in (self._multipliers, self.tangent, self.forces):
+        for thing in (self._borders, self._multipliers, self.tangent, self.forces):
             thing.destroy()

@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import as_array, require
 from cutsim.base.rotations import rotation_matrix, rotation_vector
-from cutsim.base.terms import Term
+from cutsim.base.terms import Border, Term
+from cutsim.bodies.machine import Machine
 from cutsim.fields.state import State
 from cutsim.interface.doubts import doubt_penetration
 from cutsim.interface.slip import SlipHistory
+from cutsim.tools.driven_tool import DrivenTool, Guide
 from cutsim.tools.shapes import ToolPath
 
 _AXES = "xyz"
@@ -20,12 +22,14 @@ _Action = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 class RigidTool(Term, ABC):
-    """Rigid tool that moves and turns along a path.
+    """Rigid tool that moves and turns along a path, or that machines drive along it.
 
     Args:
         state: Displacement and time.
         path: Motion of the reference point, and rotation about it.
         name: Name in messages and output.
+        machines: What drives the tool, each along one axis, along which the path is that of the machine; along all
+            others the tool follows the path itself.
 
     Attributes:
         position: Present position of the reference point [length].
@@ -35,7 +39,7 @@ class RigidTool(Term, ABC):
         ValueError: The path has another dimension than the mesh, or turns the tool of a body of revolution.
     """
 
-    def __init__(self, state: State, path: ToolPath, name: str) -> None:
+    def __init__(self, state: State, path: ToolPath, name: str, machines: Sequence[Machine] = ()) -> None:
         gdim = state.mesh.geometry.dim
         turns = path.rotation is not None
         require("path.rotation", path.rotation, not (turns and state.axisymmetric), "None for a body of revolution")
@@ -46,6 +50,8 @@ class RigidTool(Term, ABC):
         self._rotation = state.memory.array(f"{name}: rotation", self.rotation)
         none: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
         self._action = state.memory.value(f"{name}: force and moment", none)
+        self._guide = Guide(state, name, lambda t: _pose(path, t, gdim), machines) if machines else None
+        self._driven: DrivenTool | None = None
         state.verdict.suppose(self._untouched, f"{name} has never touched the body")
 
     @property
@@ -55,8 +61,24 @@ class RigidTool(Term, ABC):
 
     @property
     def corners(self) -> tuple[float, ...]:
-        """Times at which the tool's velocity jumps."""
-        return self.path.corners
+        """Times at which the tool's velocity or a force of a machine jumps."""
+        return self.path.corners if self._guide is None else (*self.path.corners, *self._guide.motion.corners)
+
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether forces depend on the size of the step."""
+        return super().rate_dependent or (self._guide is not None and self._guide.motion.rate_dependent)
+
+    @property
+    def border(self) -> Border | None:
+        """The motion of the tool as unknowns, None if it follows its path."""
+        return self._driven
+
+    @property
+    def heading(self) -> NDArray[np.float64]:
+        """Axis along which the first machine pushes it, zero if none does."""
+        axes = [] if self._guide is None else [axis for axis in self._guide.shifts if axis.any()]
+        return np.asarray(axes[0]) if axes else np.zeros_like(self.position.value)
 
     @property
     def displacement(self) -> NDArray[np.float64]:
@@ -73,18 +95,35 @@ class RigidTool(Term, ABC):
         self._action.trial = force, moment
 
     def begin(self) -> None:
-        """Move the tool to where it is at the end of the step."""
+        """Move the tool to where it is at the end of the step; one that is driven begins where it is."""
+        if self._driven is not None:
+            motion = self._driven.motion
+            rest = np.zeros_like(motion.values)
+            motion.begin(self.state.time_old, self.state.time, rest if motion.started else self._driven.reaction())
         self.move(1.0)
 
     def move(self, fraction: float) -> None:
         """Move the tool to where it is after a fraction of the step."""
         time = self.state.time_old + fraction * (self.state.time - self.state.time_old)
-        self.position.value[:], self.rotation.value[:] = _pose(self.path, time, len(self.position.value))
+        pose = _pose(self.path, time, len(self.position.value))
+        if self._guide is not None:
+            pose = self._guide.pose(pose, self._guide.motion.ahead(fraction, time))
+        self.position.value[:], self.rotation.value[:] = pose
 
     def external_work(self) -> float:
-        """Work of the tool on the body in the step: mean force and moment times their increments. Collective."""
+        """Work of the tool on the body in the step, mean force and moment times their increments. Collective.
+
+        Where machines drive it, it is they who do the work, of which a part stays with them and the tool.
+        """
         force, moment = (0.5 * (now + old) for now, old in zip(self._action.trial, self._action.committed, strict=True))
-        return float(-force @ self.displacement - moment @ self.turn)
+        work = float(-force @ self.displacement - moment @ self.turn)
+        return work if self._driven is None else work + self._driven.motion.work() - self._driven.motion.passed_on()
+
+    def _with_machines(self, energies: dict[str, float]) -> dict[str, float]:
+        """Energies of the contact, with those of the machines."""
+        for entry, value in ({} if self._driven is None else self._driven.motion.energies()).items():
+            energies[entry] = energies.get(entry, 0.0) + value
+        return energies
 
     def force(self) -> NDArray[np.float64]:
         """Force on the tool in the trial state, from the virtual work of a rigid translation [force]."""
@@ -100,7 +139,7 @@ class RigidTool(Term, ABC):
         gdim = len(force)
         columns = {f"{self.name}_{_AXES[i]}": (float(self.position.value[i]), "length") for i in range(gdim)}
         axes = _AXES if gdim == 3 else "z"
-        if self.path.rotation is not None:
+        if self.path.rotation is not None or (self._guide is not None and self._guide.turns):
             angles = zip(axes, rotation_vector(self.rotation.value), strict=True)
             columns |= {f"{self.name}_rotation_{a}": (float(angle), "angle") for a, angle in angles}
         columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
@@ -110,7 +149,7 @@ class RigidTool(Term, ABC):
             sticks, slips = np.sum([slip.areas() for slip in self.slips], axis=0)
             kind = self.state.facet_measure
             columns |= {f"{self.name}_sticking": (float(sticks), kind), f"{self.name}_slipping": (float(slips), kind)}
-        return columns
+        return columns if self._driven is None else columns | self._driven.motion.record(self.name)
 
     @property
     @abstractmethod

@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 import ufl
-from dolfinx import fem
 
 from cutsim.base.assembly import integrate, moment, nodal_forces, resultant
 from cutsim.base.checks import positive, require, require_number
@@ -16,6 +15,7 @@ from cutsim.base.memory import Remembered
 from cutsim.base.parameters import with_constants
 from cutsim.base.signatures import checked
 from cutsim.base.verdict import Verdict
+from cutsim.bodies.machine import Machine
 from cutsim.fields.points import Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
@@ -24,6 +24,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.multiplier import ContactMultiplier
 from cutsim.interface.slip import Rubbing, SlipHistory, check_friction, completed
+from cutsim.tools.driven_tool import DrivenContact
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import Shape, ToolPath, check_directions, with_constant_directions
@@ -61,6 +62,7 @@ class Patch:
     Attributes:
         surface: The surface.
         place: Position of its points in the frame of the tool [length].
+        traction: Traction on the tool, with friction, in space [stress].
         thrust: Traction of the contact pressure on the tool in that frame, −p ∇d [stress].
         normal_size: Mean size of the cells normal to the surface [length].
         slip: Memory of friction, None without friction.
@@ -72,7 +74,7 @@ class Patch:
         name: str,
         surface: Surface,
         shape: Shape,
-        pose: tuple[fem.Constant, fem.Constant],
+        pose: tuple[Expr, Expr],
         laws: ToolLaws,
         temperature: Temperature | None,
     ) -> None:
@@ -108,10 +110,11 @@ class Patch:
             start = {"work": np.zeros_like(points.weights), **self.contact()}
             self._known = state.memory.value(f"{name}: contact", start, places=points.places)
 
+        self.traction = self._rotation * (self.thrust if self.slip is None else self.thrust + self.slip.traction)
+
     def virtual_work(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ (t − p ∇d)·v: pressure and friction as they act on the tool."""
-        traction = self.thrust if self.slip is None else self.thrust + self.slip.traction
-        return ufl.dot(self._rotation * traction, self.surface.restrict(v)) * self.surface.measure
+        return ufl.dot(self.traction, self.surface.restrict(v)) * self.surface.measure
 
     def energy(self) -> ufl.Form:
         """Energy of the contact penalty."""
@@ -192,6 +195,7 @@ class ToolContact(RigidTool):
             [length].
         temperature: Temperature of the body, for friction laws that depend on it.
         name: Name in messages and output.
+        machines: What drives the tool along some axes, each one unknown; along these the path is that of the machine.
 
     Attributes:
         patches: The tool on each surface.
@@ -215,20 +219,38 @@ class ToolContact(RigidTool):
         allowed_slip: float | None = None,
         temperature: Temperature | None = None,
         name: str = "tool",
+        machines: Sequence[Machine] = (),
     ) -> None:
         check_friction("friction", friction)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
         require_number("allowed_slip", allowed_slip, positive.or_none)
-        super().__init__(state, path, name)
+        super().__init__(state, path, name, machines)
         require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
         check_directions(shape, state.mesh.geometry.dim)
         self.shape, self.contact, self.friction = shape, contact, friction
         law = completed(friction, contact.stiffness) if friction else None
         self.symmetric = law is None
-        pose, laws = (self.position, self.rotation), ToolLaws(contact, law, allowed_penetration, allowed_slip)
+        position, rotation, laws = (
+            self.position,
+            self.rotation,
+            ToolLaws(contact, law, allowed_penetration, allowed_slip),
+        )
+        # forms that are differentiated by the pose name it
+        pose = (ufl.variable(position), ufl.variable(rotation)) if machines else (position, rotation)
         self.patches = tuple(Patch(state, name, s, shape, pose, laws, temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
+        if self._guide is not None:
+            self._driven = DrivenContact(
+                state,
+                name,
+                self._guide,
+                lambda: self.move(1.0),
+                pose=pose,
+                rotation=self.rotation,
+                touches=[(p.surface, p.traction, p.place) for p in self.patches],
+                entity_maps=self.entity_maps,
+            )
         self._passing = Passing(self, self.patches)
         self._doubt_resolution()
 
@@ -296,7 +318,7 @@ class ToolContact(RigidTool):
         for slip in self.slips:
             for entry, value in slip.energies().items():
                 total[entry] += value
-        return total
+        return self._with_machines(total)
 
 
 def doubt_units(verdict: Verdict, name: str, shape: Shape, body: float) -> None:

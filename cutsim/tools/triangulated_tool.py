@@ -14,8 +14,10 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.memory import RememberedArray
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Assembler
+from cutsim.bodies.machine import Machine
 from cutsim.fields.faces import Face
 from cutsim.fields.sizes import facet_size, normal_size
+from cutsim.fields.space import locate_dofs
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import FrictionLaw
@@ -27,6 +29,7 @@ from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.pairing import Array, FacetShape, Indices
 from cutsim.pairs.partners import CurrentPartners
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
+from cutsim.tools.driven_triangles import DrivenAssembler
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import ToolPath
 from cutsim.tools.triangulation import Triangulation
@@ -74,6 +77,10 @@ class _Touch(SurfacePass):
         """Always the same."""
         return 0
 
+    def forget(self) -> None:
+        """Find the partners anew: the rigid surface has moved."""
+        self._seen = None
+
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros for all facets. Collective."""
         slave = self.kinematics.slave
@@ -102,9 +109,11 @@ class TriangulatedTool(RigidTool):
         search: Largest distance of a partner, on either side, beyond what has moved in the step [length]; by
             default the mean size of the facets.
         name: Name in messages and output.
+        machines: What drives the tool along some axes, each one unknown; along these the path is that of the machine.
 
     Raises:
-        ValueError: A parameter is outside its range, or path or surface have another dimension than the mesh.
+        ValueError: A parameter is outside its range, a machine turns the tool, or path or surface have another
+            dimension than the mesh.
     """
 
     symmetric = False
@@ -123,9 +132,10 @@ class TriangulatedTool(RigidTool):
         allowed_slip: float | None = None,
         search: float | None = None,
         name: str = "tool",
+        machines: Sequence[Machine] = (),
     ) -> None:
         check_friction("friction", friction)
-        super().__init__(state, path, name)
+        super().__init__(state, path, name, machines)
         gdim = state.mesh.geometry.dim
         for key, length in {
             "search": search,
@@ -145,6 +155,11 @@ class TriangulatedTool(RigidTool):
         law = completed(friction, contact.stiffness) if friction else None
         laws = PairLaws(None, contact, law, allowed_penetration, allowed_slip)
         self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0)
+        if self._guide is not None:
+            nodes = locate_dofs(state.V, gdim - 1, facets)
+            self._driven = DrivenAssembler(
+                state, name, self._guide, lambda: self.move(1.0), contact=self.touch, nodes=nodes, machines=machines
+            )
 
     @property
     def slips(self) -> Sequence[SlipHistory]:
@@ -164,6 +179,11 @@ class TriangulatedTool(RigidTool):
         """Move the tool; the slide of the step counts from the committed displacement."""
         super().begin()
         self.touch.begin()
+
+    def move(self, fraction: float) -> None:
+        """Move the tool to where it is after a fraction of the step: its partners are others."""
+        super().move(fraction)
+        self.touch.forget()
 
     def augment(self) -> bool:
         """Improve multiplier and carried friction; True if the step has to be solved again. Collective."""
@@ -190,4 +210,4 @@ class TriangulatedTool(RigidTool):
 
     def energies(self) -> dict[str, float]:
         """Energy of the contact penalty, friction work, and work of the pressure that neither holds. Collective."""
-        return self.touch.energies()
+        return self._with_machines(self.touch.energies())

@@ -11,6 +11,7 @@ from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
+from dolfinx import mesh
 from mpi4py import MPI
 
 import cutsim
@@ -37,11 +38,14 @@ def things():
     conductor = cutsim.HeatBody(temperature, capacity=1.0, conductivity=1.0, density=1.0)
     block = cutsim.LayeredBlock.build(layers, laminated)
     insertion = cutsim.Insertion.build(block, cutsim.Blade(0.3, 0.05, 0.1), cutsim.Drive(1.0), notch=0.25)
+    cube = make_blocks(3, 2).state
+    edge = mesh.locate_entities(cube.mesh, 0, lambda x: np.isclose(x[0], 0.0) & np.isclose(x[1], 0.0))
     corners, sides = np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), np.array([(0, 1), (1, 2), (2, 0)])
     return {
         "V": b.state.V, "bond": EXPONENTIAL, "blade": cutsim.Blade(0.3, 0.05, 0.1), "cell_tags": laminated.cell_tags,
-        "comm": comm, "conductor": conductor, "contact": contact, "control": cutsim.StepControl.fixed(1.0),
-        "corners": corners, "coulomb": cutsim.Coulomb(0.3), "crack": b.crack(),
+        "attachment": cutsim.Attachment(top), "comm": comm, "conductor": conductor, "contact": contact,
+        "control": cutsim.StepControl.fixed(1.0), "corners": corners, "coulomb": cutsim.Coulomb(0.3),
+        "crack": b.crack(), "edge": edge,
         "block": block, "insertion": insertion, "drive": cutsim.Drive(1.0), "elastic": ELASTIC,
         "entities": top, "facet_tags": laminated.facet_tags, "facets": top,
         "heat": cutsim.HeatTransfer(temperature, [conductor]), "heat law": cutsim.ContactHeat(1.0, 1.0),
@@ -49,7 +53,7 @@ def things():
         "mechanics": cutsim.Mechanics(b.state, [solid]), "mesh": b.state.mesh,
         "pair": cutsim.SurfacePair(b.state, left, right, young=1.0), "path": path, "plus": b.lower,
         "points": surface.points, "scalars": scalars, "sides": sides, "slave_facets": left, "solid": solid,
-        "state": b.state, "surface": surface, "temperature": temperature,
+        "state": b.state, "space": cube, "surface": surface, "temperature": temperature,
         "tags": laminated.tags, "tool": cutsim.ToolContact(b.state, cutsim.Ball(0.3), path, [surface], contact=contact),
         "triangle": cutsim.Triangulation(corners, sides), "vertices": np.arange(1, dtype=np.int32),
     }  # fmt: skip
@@ -57,7 +61,8 @@ def things():
 
 #: Values of parameters by name, where the kind does not say enough; "@" stands for one of the `things`.
 NAMED = {
-    "direction": (0.0, 1.0), "entities": "@entities", "facets": "@facets", "master_facets": "@master_facets",
+    "attachments": ["@attachment"], "axis": "y", "direction": (0.0, 1.0), "entities": "@entities",
+    "facets": "@facets", "master_facets": "@master_facets",
     "plus": "@plus", "poisson": 0.3, "slave_facets": "@slave_facets", "supports": [], "surfaces": ["@surface"],
     "terms": ["@solid"], "tools": ["@tool"], "vertices": "@vertices", "x": LINE, "xlabel": "x", "y": LINE,
     "ylabel": "y", "curves": [cutsim.Curve(LINE, LINE)], "history": {}, "parts": {"part": LINE}, "path": "file.msh",
@@ -74,6 +79,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Insertion.build": {"notch": 0.25},
     "Layer": {"name": "skin"},
     "LayeredBlock.build": {"layers": "@layers"},
+    "LineLoad": {"state": "@space", "vertices": "@edge", "direction": (0.0, 0.0, 1.0)},
+    "Machine": {"mass": 1.0},
     "Prony": {"strengths": (1.0,), "times": (1.0,)},
     "TaggedMesh": {
         "mesh": "@mesh",

@@ -1,0 +1,339 @@
+"""Rigid motion of a tool as unknowns, found together with the displacement of the body (docs/test_rigs.md)."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+import ufl
+from dolfinx import default_scalar_type, fem
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from cutsim.base.arrays import Array
+from cutsim.base.assembly import box, integrate, nodal_forces, summed
+from cutsim.base.checks import require
+from cutsim.base.compat import EntityMaps, form
+from cutsim.base.kinematics import Expr
+from cutsim.base.rotations import rotation_derivatives, rotation_vector
+from cutsim.base.terms import BorderBlocks
+from cutsim.bodies.machine import Machine
+from cutsim.bodies.rigid_motion import Coordinate, RigidMotion
+from cutsim.bodies.schemes import Scheme
+from cutsim.fields.points import Surface
+from cutsim.fields.space import locate_face_dofs
+from cutsim.fields.state import State
+
+# cosine between axes that counts as none
+_RIGHT = 1e-9
+# eigenvalue of the contact's stiffness, over the sum of all, that is none
+_NOTHING = 1e-12
+
+#: Position and rotation matrix of a tool, or changes of them.
+Pose = tuple[Array, Array]
+
+
+class Guide:
+    """What guides a driven tool: its path, and the axes along which machines let it deviate from that.
+
+    Args:
+        state: Displacement and time.
+        name: Name of the tool.
+        path: Position and rotation of the path at a time, the latter a matrix.
+        machines: What drives each axis.
+
+    Attributes:
+        motion: The coordinates: way along each axis since the start, of which the path prescribes that of the machine.
+        turns: Whether one of them is a rotation.
+        shifts: Change of position by each of them, one a row.
+
+    Raises:
+        ValueError: Axes of translations or of rotations are not at right angles, or an axis makes no sense here.
+    """
+
+    def __init__(self, state: State, name: str, path: Callable[[float], Pose], machines: Sequence[Machine]) -> None:
+        gdim = state.mesh.geometry.dim
+        axes = [m.direction(gdim) for m in machines]
+        self.turns = any(m.turns for m in machines)
+        _check_axes(machines, axes, axisymmetric=state.axisymmetric)
+        self.shifts = np.array([np.zeros(gdim) if m.turns else a for m, a in zip(machines, axes, strict=True)])
+        self._spins = np.array([a if m.turns else np.zeros(3) for m, a in zip(machines, axes, strict=True)])
+        low, high = box(state.mesh.comm, state.mesh.geometry.x)
+        radius = 0.5 * float(np.linalg.norm(high - low))
+        coordinates = [
+            Coordinate(_name(i, m), m, partial(_way, path, m, axis), radius if m.turns else 1.0)
+            for i, (m, axis) in enumerate(zip(machines, axes, strict=True))
+        ]
+        self.motion = RigidMotion(state.memory, name, coordinates, state.dt)
+
+    def pose(self, path: Pose, ahead: Array) -> Pose:
+        """Where the tool is.
+
+        Args:
+            path: Pose of the path at the same time.
+            ahead: How far each coordinate is ahead of the path.
+        """
+        gdim = len(path[0])
+        turn = rotation_derivatives(ahead @ self._spins)[0][:gdim, :gdim]
+        return path[0] + ahead @ self.shifts, turn @ path[1]
+
+    def slopes(self, rotation: Array) -> tuple[list[Pose], list[list[Array]]]:
+        """Derivatives of the pose by the unknowns, and second ones of its rotation, at the end of the step.
+
+        Args:
+            rotation: The present rotation.
+        """
+        gdim, motion = len(rotation), self.motion
+        turn, first, second = rotation_derivatives((motion.values - motion.paths) @ self._spins)
+        rest = turn[:gdim, :gdim].T @ rotation
+        shifts, spins = (axes / motion.units[:, None] for axes in (self.shifts, self._spins))
+        turns = np.einsum("mk,kij->mij", spins, first)[:, :gdim, :gdim] @ rest
+        curvature = np.einsum("mk,nl,klij->mnij", spins, spins, second)[..., :gdim, :gdim] @ rest
+        return list(zip(shifts, turns, strict=True)), [list(row) for row in curvature]
+
+
+def _name(place: int, machine: Machine) -> str:
+    """Name of a coordinate: its axis, or its number where the axis is a vector."""
+    return f"drive_{machine.axis.lstrip('-') if isinstance(machine.axis, str) else place + 1}"
+
+
+def _way(path: Callable[[float], Pose], machine: Machine, axis: Array, time: float) -> float:
+    """Way of a path along or about an axis since the start."""
+    (start, before), (end, after) = path(0.0), path(time)
+    if not machine.turns:
+        return float((end - start) @ axis)
+    turn = rotation_vector(after @ before.T)
+    return float(turn @ axis[-len(turn) :])
+
+
+def _check_axes(machines: Sequence[Machine], axes: Sequence[Array], *, axisymmetric: bool) -> None:
+    for i, (machine, axis) in enumerate(zip(machines, axes, strict=True)):
+        allowed = not axisymmetric or (not machine.turns and abs(axis[0]) < _RIGHT)
+        require(f"machines[{i}].axis", machine.axis, allowed, "along y in a body of revolution")
+        others = [other for also, other in zip(machines[:i], axes[:i], strict=True) if also.turns == machine.turns]
+        right = all(abs(axis @ other) < _RIGHT for other in others)
+        require(f"machines[{i}].axis", machine.axis, right, "at right angles to those before")
+
+
+class DrivenTool(ABC):
+    """Base of the unknowns of a driven tool, as `cutsim.base.terms.Border`.
+
+    Args:
+        comm: Communicator of the mesh.
+        name: Name of the tool.
+        guide: Its coordinates.
+        move: Moves the tool to the end of the step.
+        touched: Owned dofs of the surfaces that it can touch.
+
+    Attributes:
+        motion: Its coordinates over the steps.
+        held: None of them.
+        tied: No displacement.
+        touched: As above.
+    """
+
+    def __init__(
+        self, comm: MPI.Comm, name: str, guide: Guide, move: Callable[[], None], touched: NDArray[np.int32]
+    ) -> None:
+        self._comm = comm
+        self._name, self.guide, self.motion, self._move = name, guide, guide.motion, move
+        self.held, self.tied, self.touched = self.motion.held, np.empty(0, dtype=np.int32), touched
+        self._reaction = np.zeros(len(self.held))
+
+    @abstractmethod
+    def reaction(self) -> Array:
+        """Force of the body on the tool along each unknown at the present pose [force]. Collective."""
+
+    @abstractmethod
+    def rows(self) -> Array:
+        """Derivative of it by the owned displacements, one row for each unknown. Collective."""
+
+    @abstractmethod
+    def columns(self) -> Array:
+        """Derivative of the owned contact forces on the displacement by each unknown, one a row. Collective."""
+
+    @abstractmethod
+    def corner(self) -> Array:
+        """Derivative of the reaction by the unknowns. Collective."""
+
+    @property
+    def values(self) -> Array:
+        """The present unknowns [length]."""
+        return self.motion.values * self.motion.units
+
+    @property
+    def target(self) -> Array:
+        """Prescribed values: none."""
+        return np.empty(0)
+
+    def assign(self, values: Array, u: Array) -> None:
+        """Set the unknowns, and move the tool."""
+        self.motion.assign(values / self.motion.units)
+        self._move()
+
+    def residual(self, forces: Array, jump: Array | None) -> Array:
+        """Equations of motion; arguments as `Border.residual`. Collective."""
+        self._reaction = self.reaction()
+        advance = self._reaction if jump is None else self._reaction + summed(self._comm, self.rows() @ jump)
+        return self.motion.equations(advance * self.motion.units) / self.motion.units
+
+    @property
+    def loads(self) -> Array:
+        """Forces of the machines and of the body at the last residual [force]."""
+        return np.maximum(self.motion.loads / self.motion.units, np.abs(self._reaction))
+
+    def blocks(self, stiffness: PETSc.Mat) -> BorderBlocks:
+        """Derivatives at the present unknowns. Collective."""
+        own = np.diag(self.motion.stiffness() / self.motion.units**2)
+        return BorderBlocks(self.columns(), -self.rows(), own - self.corner())
+
+    def restrained(self, motions: Array) -> Array:
+        """Nothing: what the contact resists is in the tangent."""
+        return np.zeros_like(motions)
+
+    def free(self) -> str | None:
+        """A motion that neither machine nor contact resists at the committed state, in words, or None. Collective."""
+        loose = [i for i, c in enumerate(self.motion.coordinates) if c.machine is None or not c.machine.holds]
+        if not loose:
+            return None
+        stiffness = -self.corner()[np.ix_(loose, loose)]
+        values, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
+        if values[0] > _NOTHING * np.abs(values).sum():
+            return None
+        axes = [self.motion.coordinates[i].machine.axis for i in loose]  # type: ignore[union-attr]
+        along = " and ".join(repr(axes[i]) for i in np.flatnonzero(np.abs(vectors[:, 0]) > 0.1))
+        return (
+            f"{self._name} is free along {along}: nothing resists its forces. Give its machine a stiffness, a damping "
+            "or a mass, or let it begin in contact with the body"
+        )
+
+    def integrate(self, scheme: Scheme) -> None:
+        """Use a time integration scheme for the inertia of the machines."""
+        self.motion.scheme = scheme
+
+    def predict(self) -> None:
+        """Go on at the rate of the last step."""
+        self.motion.predict()
+        self._move()
+
+    def settle(self, forces: Array) -> None:
+        """Take note of the force of the body at the end of a step. Collective."""
+        self._reaction = self.reaction()
+        self.motion.settle(self._reaction * self.motion.units)
+
+
+class _VirtualMotion:
+    """Virtual motion of a tool, δp of its reference point and δR of its rotation, as form constants."""
+
+    def __init__(self, state: State, *, turns: bool) -> None:
+        gdim = state.mesh.geometry.dim
+        self._p = fem.Constant(state.mesh, np.zeros(gdim, dtype=default_scalar_type))
+        self._R = fem.Constant(state.mesh, np.zeros((gdim, gdim), dtype=default_scalar_type)) if turns else None
+
+    def set(self, pose: Pose) -> None:
+        """Choose the motion."""
+        self._p.value[:] = pose[0]
+        if self._R is not None:
+            self._R.value[:] = pose[1]
+
+    def displacement(self, place: Expr) -> Expr:
+        """Displacement of the point of the tool at a place in its frame."""
+        return self._p if self._R is None else self._p + self._R * place
+
+    def change(self, f: Expr, pose: tuple[Expr, Expr]) -> Expr:
+        """Change of a scalar that depends on the pose."""
+        moved = ufl.dot(ufl.diff(f, pose[0]), self._p)
+        return moved if self._R is None else moved + ufl.inner(ufl.diff(f, pose[1]), self._R)
+
+
+class DrivenContact(DrivenTool):
+    """Unknowns of a driven tool whose contact is written as forms, which UFL differentiates by its pose.
+
+    Args:
+        state: Displacement and time.
+        name: Name of the tool.
+        guide: Its coordinates.
+        move: Moves the tool to the end of the step.
+        pose: Position and rotation as variables of the forms.
+        rotation: The rotation.
+        touches: For each surface the traction on the tool, and the place of its points in the frame of the tool.
+        entity_maps: Entity maps of the forms.
+    """
+
+    def __init__(
+        self,
+        state: State,
+        name: str,
+        guide: Guide,
+        move: Callable[[], None],
+        *,
+        pose: tuple[Expr, Expr],
+        rotation: fem.Constant,
+        touches: Sequence[tuple[Surface, Expr, Expr]],
+        entity_maps: EntityMaps,
+    ) -> None:
+        nodes = np.unique(np.concatenate([locate_face_dofs(state.V, surface.entities) for surface, _, _ in touches]))
+        super().__init__(state.mesh.comm, name, guide, move, owned_dofs(state, nodes))
+        self._rotation = rotation
+        self._first, self._second = (_VirtualMotion(state, turns=guide.turns) for _ in range(2))
+        v = ufl.TestFunction(state.V)
+
+        def summed(density: Callable[[Surface, Expr, Expr], Expr]) -> ufl.Form:
+            return sum((density(*touch) * touch[0].measure for touch in touches), start=ufl.Form([]))
+
+        work = summed(lambda surface, traction, place: ufl.dot(traction, self._first.displacement(place)))
+        column = summed(
+            lambda surface, traction, place: self._first.change(ufl.dot(traction, surface.restrict(v)), pose)
+        )
+        corner = summed(
+            lambda surface, traction, place: self._second.change(
+                ufl.dot(traction, self._first.displacement(place)), pose
+            )
+        )
+        self._work, self._column, self._row, self._corner = (
+            form(f, entity_maps=entity_maps) for f in (work, column, ufl.derivative(work, state.u, v), corner)
+        )
+
+    def _slopes(self) -> tuple[list[Pose], list[list[Array]]]:
+        return self.guide.slopes(np.asarray(self._rotation.value))
+
+    def _each(self, evaluate: Callable[[], Array | float]) -> Array:
+        """A quantity for each unknown in turn."""
+        found = []
+        for pose in self._slopes()[0]:
+            self._first.set(pose)
+            found.append(evaluate())
+        return np.array(found)
+
+    def reaction(self) -> Array:
+        """Force of the body on the tool along each unknown at the present pose [force]. Collective."""
+        return self._each(lambda: integrate(self._work))
+
+    def rows(self) -> Array:
+        """Derivative of it by the owned displacements, one row for each unknown. Collective."""
+        return self._each(lambda: nodal_forces(self._row))
+
+    def columns(self) -> Array:
+        """Derivative of the owned contact forces on the displacement by each unknown, one a row. Collective."""
+        return self._each(lambda: nodal_forces(self._column))
+
+    def corner(self) -> Array:
+        """Derivative of the reaction by the unknowns. Collective."""
+        poses, curvature = self._slopes()
+        found = np.zeros((len(poses), len(poses)))
+        for i, pose in enumerate(poses):
+            self._first.set(pose)
+            for j, other in enumerate(poses):
+                self._second.set(other)
+                found[i, j] = integrate(self._corner)
+        for i, j in np.ndindex(found.shape if self.guide.turns else (0, 0)):
+            self._first.set((np.zeros_like(poses[i][0]), curvature[i][j]))
+            found[i, j] += integrate(self._work)
+        return found
+
+
+def owned_dofs(state: State, nodes: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Owned dofs of some local nodes (blocked dofs)."""
+    gdim, owned = state.mesh.geometry.dim, state.V.dofmap.index_map.size_local
+    return np.asarray((gdim * nodes[nodes < owned, None] + np.arange(gdim)).ravel(), dtype=np.int32)
