@@ -88,6 +88,7 @@ from .results.setup_picture import draw_setup as draw_setup
 from .results.stage_recorder import Stages as Stages
 from .solvers.convergence import Tolerances as Tolerances
 from .studies.body import CrackedBody as CrackedBody
+from .studies.body import Faces as Faces
 from .studies.body import cracked_block as cracked_block
 from .studies.drive import Drive as Drive
 from .studies.fixture import Fixture as Fixture

@@ -211,7 +211,7 @@ def test_only_straight_simplices_are_refined(tmp_path):
         gmsh.model.mesh.generate(2)
 
     path = drawn(tmp_path / "square.msh", draw)
-    with pytest.raises(ValueError, match="refine = .* must be None for cells of the kind 'quadrilateral'"):
+    with pytest.raises(ValueError, match=r"refine = .* must be None for cells of the kind 'quadrilateral'"):
         read_mesh(path, COMM, 2, refine=Refinement(("low",), 0.1))
 
 

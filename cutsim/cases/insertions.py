@@ -10,7 +10,6 @@ from cutsim.cases.heating import temperature
 from cutsim.cases.refusals import refused, refusing
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
-from cutsim.interface.crack import Crack
 from cutsim.studies.body import CrackedBody, cracked_state
 from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock
@@ -79,9 +78,11 @@ def _cracked(domain: Domain) -> tuple[CrackedBody, Temperature | None]:
     value = temperature(domain, state, [bonded, *broken])
     bodies = solids(domain, state, value)
     with refusing(domain.document, _KEY):
-        faces = Crack(state, bonded, plus, tables.law, young=softest(bodies, bonded))
-        cut = [Crack(state, f, plus, None, young=softest(bodies, f), name="notch") for f in broken]
-    return CrackedBody(domain.tagged, state, bodies, (faces,), cut[0] if cut else None), value
+        faces = tables.insertion.faces
+        cracks = (faces.crack(state, bonded, plus, tables.law, young=softest(bodies, bonded)),)
+        cut = [faces.crack(state, f, plus, None, young=softest(bodies, f), name="notch") for f in broken]
+        guides = faces.guides(cracks)
+    return CrackedBody(domain.tagged, state, bodies, cracks, cut[0] if cut else None, guides=guides), value
 
 
 def _state(domain: Domain, split: Sequence[Entities]) -> State:
@@ -101,6 +102,7 @@ def _layered(domain: Domain) -> tuple[LayeredBlock, Temperature | None]:
             damping=tables.insertion.damping,
             axisymmetric=tables.mesh.axisymmetric,
             degree=tables.mesh.degree,
+            faces=tables.insertion.faces,
         )
     return block, temperature(domain, block.state, [block.slit])
 

@@ -15,6 +15,7 @@ from cutsim.bodies.schemes import Newmark, Scheme
 from cutsim.cases.constructed import Constructed, FromTable, With, annotated, choice, made, table_of
 from cutsim.cases.names import BodyName, CrackName, ToolName
 from cutsim.cases.tables import NONNEGATIVE, POSITIVE, Flag, Table, Whole, chosen_by
+from cutsim.studies.body import Faces
 from cutsim.studies.drive import Drive
 from cutsim.studies.fixture import Fixture
 
@@ -28,6 +29,7 @@ class Insertion(Constructed):
         push: In which push that is, 2 for the second one of a tool that turns.
         notch: Depth of the notch in which the tool is inserted, 0 for a body without one [length].
         groups: Groups of the facets of the crack, of those of the notch, and of the cells on the '+' side of both.
+        faces: How the faces of crack and notch meet.
         fixture: Groups where the tool enters and where the body is held.
         damping: Kelvin–Voigt viscosity over Young's modulus of every layer [time].
     """
@@ -37,6 +39,7 @@ class Insertion(Constructed):
     push: Annotated[Whole, POSITIVE] = 1
     notch: Annotated[Length, NONNEGATIVE] = 0.0
     groups: tuple[str, str, str] = ("crack", "notch", "right")
+    faces: Annotated[Faces, FromTable()] = Field(default_factory=Faces)
     fixture: Annotated[Fixture, FromTable()] = Field(default_factory=Fixture)
     damping: Annotated[Time, NONNEGATIVE] = 0.0
 

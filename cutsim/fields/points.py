@@ -169,6 +169,10 @@ class FacetPoints:
         total = self.comm.allreduce(total, op=MPI.SUM)
         return float(total[0] / total[1])
 
+    def median(self, per_facet: Values) -> float:
+        """Median over all facets of one value per local facet. Collective."""
+        return float(np.median(np.concatenate(self.comm.allgather(per_facet[: self._owned]))))
+
     def _space(self, components: int) -> fem.FunctionSpace:
         shape = () if components == 1 else (components,)
         cell = self.submesh.topology.cell_name()

@@ -121,8 +121,8 @@ class Crack(Term):
 
     @property
     def size(self) -> float:
-        """Mean size of the facets along the crack, their shortest edge [length]. Collective."""
-        return self.points.mean(facet_size(self.state.mesh, self.points.facets))
+        """Median size of the facets along the crack, of their shortest edges [length]; ends may be coarser. Collective."""
+        return self.points.median(facet_size(self.state.mesh, self.points.facets))
 
     @property
     def companions(self) -> Sequence[Term]:

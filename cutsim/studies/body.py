@@ -1,7 +1,7 @@
 """Cracked body, ready to be cut: solids, bond and notch."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,16 +9,77 @@ from numpy.typing import NDArray
 
 from cutsim.base.checks import count, nonnegative, require, require_number
 from cutsim.base.signatures import checked
+from cutsim.base.terms import Term
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh
+from cutsim.fields.sizes import global_range, normal_size
 from cutsim.fields.space import cracked_space
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
+from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
+from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.guide import Guide
+from cutsim.interface.slip import check_friction
 from cutsim.materials.elastic import Material
 from cutsim.results.recording import Columns
 
 Facets = NDArray[np.int32]
+
+# contact of the faces of a crack under a tip that indents it: penalty over E/h, and blend over h
+_FIRM, _BLEND = 50.0, 0.02
+
+
+@checked
+@dataclass(frozen=True)
+class Faces:
+    """How the faces of a crack meet that a tool is going to part.
+
+    A tip that indents an intact surface presses the faces on each other before it parts them, and draws the mouth of
+    the crack out along itself, up to a right angle. If both sides are alike, the faces part along the normal of the
+    plane, however they turn, and their middle is kept in it by a `Guide`; and their contact is firmer.
+
+    Args:
+        symmetric: Whether body and tool are alike on both sides of a plane crack.
+        friction: Friction law of the faces on each other, or the coefficient of Coulomb's; None for none. It acts
+            where the bond is broken.
+
+    Raises:
+        ValueError: The coefficient is negative.
+    """
+
+    symmetric: bool = False
+    friction: FrictionLaw | float | None = None
+
+    def __post_init__(self) -> None:
+        check_friction("friction", self.friction)
+
+    def crack(
+        self,
+        state: State,
+        facets: Facets,
+        plus: Facets | tuple[float, ...],
+        law: CohesiveLaw | None,
+        *,
+        young: float,
+        name: str = "crack",
+    ) -> Crack:
+        """A crack with such faces; arguments as for `Crack`. Collective."""
+        options: dict[str, Any] = {"young": young, "name": name, "friction": self.friction}
+        if self.symmetric:
+            require("faces.symmetric", True, not state.axisymmetric, "False in a body of revolution")
+            smallest = global_range(state.mesh.comm, normal_size(state.mesh, facets))[0]
+            firm = PenaltyContact.automatic(young, smallest, _FIRM, blend=_BLEND * smallest)
+            options |= {"normal": "reference", "contact": firm}
+        return Crack(state, facets, plus, law, **options)
+
+    def guides(self, cracks: Sequence[Crack]) -> tuple[Guide, ...]:
+        """What keeps the middle of some cracks in their plane."""
+        return tuple(Guide(crack) for crack in cracks) if self.symmetric else ()
+
+
+#: Faces of which nothing is known beforehand.
+PLAIN = Faces()
 
 
 @dataclass(frozen=True)
@@ -35,6 +96,7 @@ class CrackedBody:
         cracks: The bonded crack, in a part for each cohesive law, the one nearest to the surface first. All of them
             have '+' on the same side.
         notch: Faces that touch and do not stick, from the surface to the first crack; None without a notch.
+        guides: What keeps the middle of the cracks in their plane, see `Faces`.
     """
 
     domain: TaggedMesh
@@ -42,11 +104,12 @@ class CrackedBody:
     solids: tuple[Solid, ...]
     cracks: tuple[Crack, ...]
     notch: Crack | None
+    guides: tuple[Guide, ...] = field(default=(), kw_only=True)
 
     @property
-    def terms(self) -> list[Solid | Crack]:
-        """Solids and cracks, for the mechanical problem."""
-        return [*self.solids, *self.cracks, *([] if self.notch is None else [self.notch])]
+    def terms(self) -> list[Term]:
+        """Solids, cracks and guides, for the mechanical problem."""
+        return [*self.solids, *self.cracks, *([] if self.notch is None else [self.notch]), *self.guides]
 
     @property
     def mouth(self) -> Facets:
@@ -74,6 +137,7 @@ def cracked_block(
     degree: int = 1,
     groups: Sequence[str] = ("crack", "notch", "right"),
     solid: Mapping[str, Any] | None = None,
+    faces: Faces = PLAIN,
 ) -> CrackedBody:
     """Put one solid and one crack on a mesh. Collective.
 
@@ -88,6 +152,7 @@ def cracked_block(
         groups: Names of the facets of the crack, of those of the notch, and of the cells on the '+' side of both. A
             mesh without the second has no notch.
         solid: Further arguments of `Solid`, such as ``{"volumetric": "taylor-hood", "density": 1.1e-9}``.
+        faces: How the faces of crack and notch meet.
 
     Raises:
         ValueError: A parameter is outside its range, or the mesh lacks a group.
@@ -100,12 +165,14 @@ def cracked_block(
     broken = domain.facets(notch) if notch in domain.names else None
     state = cracked_state(domain, [bonded] if broken is None else [bonded, broken], degree, axisymmetric)
     young = material.young
+    cut = (faces.crack(state, bonded, plus, law, young=young),)
     return CrackedBody(
         domain,
         state,
         (Solid(state, material, name="block", viscosity=viscosity, **(solid or {})),),
-        (Crack(state, bonded, plus, law, young=young),),
-        None if broken is None else Crack(state, broken, plus, None, young=young, name="notch"),
+        cut,
+        None if broken is None else faces.crack(state, broken, plus, None, young=young, name="notch"),
+        guides=faces.guides(cut),
     )
 
 

@@ -56,7 +56,8 @@ class Motion:
         start_depth: Depth of the tip when the push begins [length].
         entry_time: Time at which the push begins [time].
         turning_depth: Depth at which the tool turns back, None if it does not [length].
-        height: Depth of the body's far side [length].
+        reach: Depth that the tip has to stay above: that of the body's far side, or infinity if the body is held at
+            its ends and may fall in two [length].
     """
 
     speed: float
@@ -64,11 +65,11 @@ class Motion:
     start_depth: float
     entry_time: float
     turning_depth: float | None
-    height: float
+    reach: float
 
     @classmethod
-    def of(cls, drive: Drive, tool: Pointed, notch: float, height: float) -> "Motion":
-        """The motion of a tool in a body with a notch, or without one, of a height.
+    def of(cls, drive: Drive, tool: Pointed, notch: float, reach: float) -> "Motion":
+        """The motion of a tool in a body with a notch, or without one, above a depth.
 
         Raises:
             ValueError: The tool is to turn before the push begins, or below the body.
@@ -77,9 +78,9 @@ class Motion:
         start_height = start_depth or tool.tip_radius
         if drive.turning_depth is not None:
             require_number("turning_depth", drive.turning_depth, above(start_depth, "the start of the push"))
-            require_number("turning_depth", drive.turning_depth, between(0, height, name="the height of the body"))
+            require_number("turning_depth", drive.turning_depth, between(0, reach, name="the height of the body"))
         entry_time = drive.entry_time or start_height / drive.speed
-        return cls(drive.speed, start_height, start_depth, entry_time, drive.turning_depth, height)
+        return cls(drive.speed, start_height, start_depth, entry_time, drive.turning_depth, reach)
 
     @property
     def pushes(self) -> int:
@@ -100,7 +101,7 @@ class Motion:
             ValueError: The push begins deeper, the body or the first push ends before, or there is no such push.
         """
         require_number("depth", depth, at_least(self.start_depth, "the start of the push"))
-        require_number("depth", depth, between(self.start_depth, self.height, "[)", name="the height of the body"))
+        require_number("depth", depth, between(self.start_depth, self.reach, "[)", name="the height of the body"))
         require("push", push, push in range(1, self.pushes + 1), f"1 … {self.pushes}")
         way, turning = depth - self.start_depth, self.turning_depth
         if turning is not None:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
+import numpy as np
+
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.base.checks import above, nonnegative, require, require_number
 from cutsim.base.signatures import checked
@@ -96,7 +98,7 @@ class Insertion:
         _check_tool(tool, body)
         frame = Frame.of(body, tool, fixture.plate, fixture.symmetry if fixture.halved(body) else None)
         _check_notch(body, tool, frame, notch)
-        motion = Motion.of(drive, tool, notch, frame.height)
+        motion = Motion.of(drive, tool, notch, np.inf if fixture.ends else frame.height)
         doubt_units(body.state.verdict, _kind(tool), tool, frame.height)
         contacts = _contacts(body, tool, frame, motion, fixture.top, friction)
         parts, plate = ToolParts(contacts, tool), fixture.support(body, frame)
@@ -201,7 +203,7 @@ def _contacts(
                 half,
                 motion.path(frame, half),
                 _surfaces(body, crack, face, group),
-                contact=half.contact(crack.young, crack.normal_size),
+                contact=(half.contact if body.notch else half.firm_contact)(crack.young, crack.normal_size),
                 friction=friction,
                 name=name,
             )

@@ -19,7 +19,7 @@ from cutsim.interface.crack import Crack
 from cutsim.materials.elastic import Material
 from cutsim.materials.library import SKIN, material
 from cutsim.results.recording import Columns
-from cutsim.studies.body import CrackedBody, cracked_state
+from cutsim.studies.body import PLAIN, CrackedBody, Faces, cracked_state
 
 # the '+' face of the crack is that of the half x > 0, whose normal points to −x
 _PLUS = (-1.0, 0.0, 0.0)
@@ -93,6 +93,7 @@ class LayeredBlock(CrackedBody):
         axisymmetric: bool = False,
         degree: int = 1,
         plus: Sequence[float] | None = None,
+        faces: Faces = PLAIN,
     ) -> Self:
         """Put solids and cracks on a mesh. Collective.
 
@@ -103,6 +104,7 @@ class LayeredBlock(CrackedBody):
             axisymmetric: Whether the mesh is the meridian plane of a body of revolution.
             degree: Degree of the displacement.
             plus: Direction that points out of the '+' half of the block into the other one; −x by default.
+            faces: How the faces of cracks and notch meet.
 
         Raises:
             ValueError: A parameter is outside its range, or the mesh lacks a layer.
@@ -121,12 +123,13 @@ class LayeredBlock(CrackedBody):
         solids = tuple(_solid(state, layer, where, damping) for layer, where in zip(layers, cells, strict=True))
         names = ["crack"] if len(parts) == 1 else [_group(part[0]) for part in parts]
         cracks = tuple(
-            Crack(state, where, towards, part[0].law, young=_softest(part), name=name)
+            faces.crack(state, where, towards, part[0].law, young=_softest(part), name=name)
             for name, part, where in zip(names, parts, facets, strict=True)
         )
         through = [layer for layer in layers if layer not in parts[0][1:] and all(layer not in p for p in parts[1:])]
-        notch = [Crack(state, where, towards, None, young=_softest(through), name="notch") for where in broken]
-        return cls(domain, state, solids, cracks, notch[0] if notch else None, tuple(layers))
+        notch = [faces.crack(state, where, towards, None, young=_softest(through), name="notch") for where in broken]
+        guides = faces.guides(cracks)
+        return cls(domain, state, solids, cracks, notch[0] if notch else None, tuple(layers), guides=guides)
 
     def layers_of(self, crack: Crack) -> list[Layer]:
         """The layers through which a part of the crack goes."""

@@ -17,6 +17,9 @@ from cutsim.base.units import Angle, Length
 from cutsim.interface.contact import PenaltyContact
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit_vector
 
+# penalty over E/h and half the width of the quadratic start over h, for an intact surface
+_FIRM, _BLEND = 4000.0, 0.1
+
 
 def _pointed(across: Expr, above: Expr, half_angle: float, width: float, radius: float) -> Expr:
     """Distance to a pointed body with a rounded tip and joint, in the plane of its axis.
@@ -83,6 +86,18 @@ class Pointed(ABC):
         """
         factor, blend = self.firmness
         return PenaltyContact.automatic(young, h, factor, blend=blend * self.tip_radius)
+
+    @staticmethod
+    def firm_contact(young: float, h: float) -> PenaltyContact:
+        """Contact law on an intact surface, where a tip presses much harder than in a cut.
+
+        The pressure grows with the square of the penetration. At a hundred times Young's modulus it is a tenth of h.
+
+        Args:
+            young: Young's modulus of the solid [stress].
+            h: Size of its cells normal to the surface [length].
+        """
+        return PenaltyContact.automatic(young, h, _FIRM, blend=_BLEND * h)
 
     @property
     def shaft_height(self) -> float:

@@ -1,0 +1,88 @@
+"""Puncture of an intact surface: the guide of a plane cut, the event itself, and a body that is cut through."""
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+
+from cutsim import (
+    Blade,
+    Crack,
+    Drive,
+    Exponential,
+    Faces,
+    Fixture,
+    Insertion,
+    MeshRule,
+    NeoHookean,
+    State,
+    StepControl,
+    cracked_block,
+    cracked_space,
+    geometry,
+    read_geo,
+    run,
+)
+from cutsim.interface.guide import Guide
+
+COMM = MPI.COMM_WORLD
+SOLID, BOND = NeoHookean(0.777, 0.45), Exponential(strength=0.3, toughness=0.1)
+BLADE = Blade(np.radians(20), 0.1, 0.4)
+RULE = MeshRule.of([BLADE], [BOND])
+
+
+def block(**sizes):
+    plain = {"dim": 2, "Lx": 0.8, "H": 1.0, "band": 0.2, "growth": 1.8, "notch": 0, "lc": 0.1}
+    return read_geo(geometry("block"), COMM, plain | sizes, gdim=2)
+
+
+@pytest.mark.mpi
+def test_a_guide_resists_the_way_off_the_plane_and_nothing_else():
+    """½ k m² per length for a body that moves by m across the plane; nothing for faces that part or slide along it."""
+    domain = block()
+    facets = domain.facets("crack")
+    state = State(cracked_space(domain.mesh, ("Lagrange", 1, (2,)), facets))
+    guide = Guide(Crack(state, facets, (-1.0, 0.0), BOND, young=1.0), stiffness=3.0)
+
+    def stored(left, right, up):
+        for name, across in (("left", left), ("right", right)):
+            state.u.interpolate(lambda x, a=across: np.array([0 * x[0] + a, 0 * x[0] + up]), domain.cells(name))
+        state.u.x.scatter_forward()
+        return guide.energies()["contact"]
+
+    assert stored(0.2, 0.2, 0.0) == pytest.approx(0.5 * 3.0 * 0.2**2 * 1.0)
+    assert stored(0.0, 0.2, 0.0) == pytest.approx(0.5 * 3.0 * 0.1**2 * 1.0)
+    assert stored(-0.3, 0.3, 0.4) == pytest.approx(0.0, abs=1e-15)
+
+
+def pushed(depth, fixture=None, sizes=None, **drive):
+    """Intact block and blade: insertion, and columns by name with an entry for each step."""
+    rule = {"lc": RULE.size, "entry": RULE.mouth, "band": 2 * RULE.size}
+    body = cracked_block(block(**(rule | (sizes or {}))), SOLID, BOND, viscosity=0.002, faces=Faces(symmetric=True))
+    cut = Insertion.build(body, BLADE, Drive(1.0), **({} if fixture is None else {"fixture": fixture}))
+    rows = []
+
+    def record(report):
+        deep = max(contact.penetration() * contact.patches[0].normal_size for contact in cut.contacts)
+        rows.append(report.columns | cut.columns(report.columns) | {"deepest": (deep, "length")})
+
+    run(cut.mechanics, cut.time_of(depth), StepControl(first=0.02, largest=0.1, smallest=1e-5, closure=2e-3), record)
+    return cut, {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
+
+
+def test_an_intact_surface_is_punctured():
+    """It is indented, the crack starts by itself, and the force drops: more than the work of the cut has been stored."""
+    cut, rows = pushed(1.5, sizes={"H": 2.2, "Lx": 1.2})
+    peak = int(np.argmax(rows["force"]))
+    assert 0 < peak < len(rows["force"]) - 1 and rows["force"][peak] > 1.2 * BOND.toughness
+    assert rows["front"][peak] < 0.5 * rows["front"][-1], "most of the cut comes after the peak"
+    assert rows["force"][peak:].min() < 0.9 * rows["force"][peak]
+    assert rows["deepest"].max() < 0.1 * RULE.size
+    assert np.abs(rows["energy_closure"]).max() < 0.01
+    assert rows["energy_contact"].max() < 0.05 * rows["energy_strain"].max(), "the guide holds nothing"
+    assert not cut.state.verdict.doubts
+
+
+def test_faces_of_a_thread_are_not_alike():
+    domain = read_geo(geometry("thread"), COMM, {"R": 1, "H": 2, "deep": 1, "lc": 0.3, "notch": 0}, gdim=2)
+    with pytest.raises(ValueError, match=r"faces.symmetric = True .* body of revolution"):
+        cracked_block(domain, SOLID, BOND, axisymmetric=True, faces=Faces(symmetric=True))
