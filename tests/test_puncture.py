@@ -10,7 +10,6 @@ from cutsim import (
     Drive,
     Exponential,
     Faces,
-    Fixture,
     Insertion,
     MeshRule,
     NeoHookean,
@@ -57,7 +56,7 @@ def test_a_guide_resists_the_way_off_the_plane_and_nothing_else():
 def pushed(depth, fixture=None, sizes=None, **drive):
     """Intact block and blade: insertion, and columns by name with an entry for each step."""
     rule = {"lc": RULE.size, "entry": RULE.mouth, "band": 2 * RULE.size}
-    body = cracked_block(block(**(rule | (sizes or {}))), SOLID, BOND, viscosity=0.002, faces=Faces(symmetric=True))
+    body = cracked_block(block(**(rule | (sizes or {}))), SOLID, BOND, viscosity=0.004, faces=Faces(symmetric=True))
     cut = Insertion.build(body, BLADE, Drive(1.0), **({} if fixture is None else {"fixture": fixture}))
     rows = []
 
@@ -65,13 +64,13 @@ def pushed(depth, fixture=None, sizes=None, **drive):
         deep = max(contact.penetration() * contact.patches[0].normal_size for contact in cut.contacts)
         rows.append(report.columns | cut.columns(report.columns) | {"deepest": (deep, "length")})
 
-    run(cut.mechanics, cut.time_of(depth), StepControl(first=0.02, largest=0.1, smallest=1e-5, closure=2e-3), record)
+    run(cut.mechanics, cut.time_of(depth), StepControl(first=0.02, largest=0.1, smallest=1e-5, closure=5e-3), record)
     return cut, {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
 
 
 def test_an_intact_surface_is_punctured():
-    """It is indented, the crack starts by itself, and the force drops: more than the work of the cut has been stored."""
-    cut, rows = pushed(1.5, sizes={"H": 2.2, "Lx": 1.2})
+    """It is indented, the crack starts by itself and runs ahead, and the force drops."""
+    cut, rows = pushed(0.7, sizes={"H": 1.6, "Lx": 1.2})
     peak = int(np.argmax(rows["force"]))
     assert 0 < peak < len(rows["force"]) - 1 and rows["force"][peak] > 1.2 * BOND.toughness
     assert rows["front"][peak] < 0.5 * rows["front"][-1], "most of the cut comes after the peak"

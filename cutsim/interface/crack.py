@@ -121,7 +121,7 @@ class Crack(Term):
 
     @property
     def size(self) -> float:
-        """Median size of the facets along the crack, of their shortest edges [length]; ends may be coarser. Collective."""
+        """Median size of the facets along the crack, whose end may be coarser [length]. Collective."""
         return self.points.median(facet_size(self.state.mesh, self.points.facets))
 
     @property

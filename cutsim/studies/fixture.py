@@ -24,8 +24,8 @@ class Fixture:
     """Fixture: names of the groups of a mesh where the tool enters and where the body is held.
 
     The body rests on a smooth plate. Where its ends are free it is also held across the crack plane along the line in
-    which that meets the plate; in space, without plane of symmetry or walls, also along this line, in its middle. A body
-    that is held at its ends may be cut through.
+    which that meets the plate; in space, without plane of symmetry or walls, also along this line, in its middle. A
+    body that is held at its ends may be cut through.
 
     Args:
         top: Facets of the surface beside the '−' and the '+' face of the crack.

@@ -134,7 +134,7 @@ def push(setting: Setting, notch: float, out: Path) -> History:
     control = StepControl(first=0.02, largest=0.1 if not setting.friction else 0.05, smallest=1e-5, closure=2e-3)
     deepest: list[float] = []
 
-    def columns(columns):  # noqa: ANN001, ANN202
+    def columns(columns):
         deepest.append(max(contact.penetration() * contact.patches[0].normal_size for contact in cut.contacts))
         return cut.columns(columns) | {"penetration": (deepest[-1], "length")}
 
