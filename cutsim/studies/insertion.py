@@ -196,6 +196,7 @@ def _contacts(
     found = []
     for face, side, group in faces:
         half = tool if body.state.axisymmetric else replace(tool, side=side)  # type: ignore[type-var]
+        law = half.firm_contact if body.notch is None and (body.guides or body.state.axisymmetric) else half.contact
         for crack in body.cracks:
             name = "_".join([_kind(tool), _SIDES[side], *([crack.name] if len(body.cracks) > 1 else [])])
             contact = ToolContact(
@@ -203,7 +204,7 @@ def _contacts(
                 half,
                 motion.path(frame, half),
                 _surfaces(body, crack, face, group),
-                contact=(half.contact if body.notch else half.firm_contact)(crack.young, crack.normal_size),
+                contact=law(crack.young, crack.normal_size),
                 friction=friction,
                 name=name,
             )
