@@ -24,6 +24,7 @@ WIDE = {
     "analysis.mechanics.Mechanics.__init__": 10,
     "interface.crack.Crack.__init__": 11,
     "fields.laminate.laminate": 9,
+    "studies.body.cracked_block": 9,
     "tools.tool_contact.ToolContact.__init__": 11,
     "tools.triangulated_tool.TriangulatedTool.__init__": 11,
 }

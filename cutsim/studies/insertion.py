@@ -17,7 +17,7 @@ from cutsim.fields.points import Surface
 from cutsim.fields.state import State
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import check_friction
+from cutsim.interface.slip import check_friction, completed
 from cutsim.results.recording import Columns
 from cutsim.studies.body import CrackedBody
 from cutsim.studies.cut_area import CutArea
@@ -193,19 +193,20 @@ def _contacts(
     faces: list[tuple[Literal["+", "-"], int, str]] = [("+", plus, top[1])]
     if not body.state.axisymmetric:  # there the thread does not meet the tool
         faces.append(("-", -plus, top[0]))
+    indents = body.notch is None and (bool(body.guides) or body.state.axisymmetric)
     found = []
     for face, side, group in faces:
         half = tool if body.state.axisymmetric else replace(tool, side=side)  # type: ignore[type-var]
-        law = half.firm_contact if body.notch is None and (body.guides or body.state.axisymmetric) else half.contact
         for crack in body.cracks:
+            soft = half.contact(crack.young, crack.normal_size)
             name = "_".join([_kind(tool), _SIDES[side], *([crack.name] if len(body.cracks) > 1 else [])])
             contact = ToolContact(
                 body.state,
                 half,
                 motion.path(frame, half),
                 _surfaces(body, crack, face, group),
-                contact=law(crack.young, crack.normal_size),
-                friction=friction,
+                contact=half.firm_contact(crack.young, crack.normal_size) if indents else soft,
+                friction=completed(friction, soft.stiffness) if friction else None,
                 name=name,
             )
             if crack is not body.cracks[0]:  # how deep the cut will go is not known

@@ -18,7 +18,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit_vector
 
 # penalty over E/h and half the width of the quadratic start over h, for an intact surface
-_FIRM, _BLEND = 4000.0, 0.1
+_FIRM, _BLEND = 1000.0, 0.1
 
 
 def _pointed(across: Expr, above: Expr, half_angle: float, width: float, radius: float) -> Expr:
@@ -91,7 +91,7 @@ class Pointed(ABC):
     def firm_contact(young: float, h: float) -> PenaltyContact:
         """Contact law on an intact surface, where a tip presses much harder than in a cut.
 
-        The pressure grows with the square of the penetration. At a hundred times Young's modulus it is a tenth of h.
+        The pressure grows with the square of the penetration. At 25 times Young's modulus that is a tenth of h.
 
         Args:
             young: Young's modulus of the solid [stress].
