@@ -78,7 +78,7 @@ def test_an_intact_surface_is_punctured():
     assert rows["deepest"].max() < 0.1 * RULE.size
     assert np.abs(rows["energy_closure"]).max() < 0.01
     assert rows["energy_contact"].max() < 0.05 * rows["energy_strain"].max(), "the guide holds nothing"
-    assert not cut.state.verdict.doubts
+    assert set(cut.state.verdict.doubts) <= {"viscosity"}, "which takes what is set free"
 
 
 def test_faces_of_a_thread_are_not_alike():
