@@ -47,8 +47,8 @@ History = dict[str, np.ndarray]
 
 # ## Materials
 #
-# A soft gel, of 20 kPa and 15 J/m², and silicone [mm, MPa].  The strength is chosen: the mesh has to resolve the zone
-# in which the bond softens.
+# A soft gel, of 20 kPa and 15 J/m², and a strip of silicone [mm, MPa].  The strength is chosen: the mesh has to resolve
+# the zone in which the bond softens.
 
 
 @dataclass(frozen=True)
@@ -63,19 +63,27 @@ class Setting:
     depth: float
     half_thickness: float = 0.75
     length: float = 5.0
+    degrees: float = 15
     friction: float = 0.0
-    notch: float = 0.8
+    notch: float = 0.4
 
     @property
     def blade(self) -> Blade:
         """The tool."""
-        return Blade(np.radians(15), self.radius, self.half_thickness)
+        return Blade(np.radians(self.degrees), self.radius, self.half_thickness)
 
     def build(self, notch: float) -> Insertion:
         """Block and blade, above an intact surface or in a notch. Collective."""
         rule = MeshRule.of([self.blade], [self.bond])
         deep = self.depth + 0.5
-        sizes = {"dim": 2, "Lx": self.length, "H": self.depth + 3, "notch": notch, "deep": deep, "lc": rule.size}
+        sizes = {
+            "dim": 2,
+            "Lx": self.length,
+            "H": self.depth + (3 if self.length > 2 else 1),
+            "notch": notch,
+            "deep": deep,
+            "lc": rule.size,
+        }
         sizes |= {"band": 2 * rule.size, "growth": 1.8, "entry": rule.mouth}
         domain = read_geo(geometry("block"), MPI.COMM_WORLD, sizes, gdim=2)
         faces = Faces(symmetric=True)
@@ -84,14 +92,14 @@ class Setting:
 
 
 GEL, GEL_BOND = NeoHookean(0.02, 0.45), Exponential(strength=0.03, toughness=0.015)
-SILICONE, SILICONE_BOND = NeoHookean(0.777, 0.45), Exponential(strength=0.6, toughness=0.2)
-BLUNT = Setting("gel, blunt", GEL, GEL_BOND, 1e-4, 0.3, 8.0)
-SHARP = Setting("gel, sharp", GEL, GEL_BOND, 1e-4, 0.05, 6.0, notch=0.4)
-RUBBER = Setting("silicone", SILICONE, SILICONE_BOND, 1e-3, 0.1, 4.0, 0.5, 3.0, notch=0.4)
-RUBBED = Setting("silicone, friction 0.1", SILICONE, SILICONE_BOND, 1e-3, 0.1, 4.0, 0.5, 3.0, 0.1, notch=0.4)
+STRIP, STRIP_BOND = NeoHookean(0.777, 0.45), Exponential(strength=0.3, toughness=0.1)
+BLUNT_GEL = Setting("gel, r = 0.3 mm", GEL, GEL_BOND, 1e-4, 0.3, 6.5, notch=0.8)
+SHARP_GEL = Setting("gel, r = 0.05 mm", GEL, GEL_BOND, 1e-4, 0.05, 5.0)
+SILICONE = Setting("silicone, r = 0.1 mm", STRIP, STRIP_BOND, 2e-3, 0.1, 2.2, 0.4, 1.2, 20)
+RUBBED = Setting("silicone, r = 0.1 mm, friction 0.2", STRIP, STRIP_BOND, 2e-3, 0.1, 2.2, 0.4, 1.2, 20, friction=0.2)
 
-FULL = (BLUNT, SHARP, RUBBER, RUBBED)
-QUICK = (RUBBER,)
+FULL = (BLUNT_GEL, SHARP_GEL, SILICONE, RUBBED)
+QUICK = (SILICONE,)
 
 
 def main(
@@ -107,7 +115,7 @@ def main(
     settings = [s for s in (QUICK if quick else FULL) if only in ("", s.name)]
     for setting in settings:
         intact, notched = (push(setting, notch, out) for notch in (0.0, setting.notch))
-        summary |= {f"{setting.name}, {name}": value for name, value in found(setting, intact, notched).items()}
+        summary |= {f"{setting.name}: {name}": value for name, value in found(setting, intact, notched).items()}
         for history, label in ((intact, "intact"), (notched, "notched")):
             curves.append(
                 Curve(history["depth"], history["force"] / setting.bond.toughness, f"{setting.name}, {label}")
@@ -130,7 +138,7 @@ def main(
 def push(setting: Setting, notch: float, out: Path) -> History:
     """A push to the end. Collective."""
     cut = setting.build(notch)
-    folder = out / f"{setting.name.replace(' ', '_')}_{'notched' if notch else 'intact'}"
+    folder = out / f"{''.join(c if c.isalnum() else '_' for c in setting.name)}_{'notched' if notch else 'intact'}"
     control = StepControl(first=0.02, largest=0.1 if not setting.friction else 0.05, smallest=1e-5, closure=2e-3)
     deepest: list[float] = []
 
@@ -165,11 +173,18 @@ def found(setting: Setting, intact: History, notched: History) -> dict[str, floa
         "least force after it over the peak": float(intact["force"][after].min() / intact["force"][peak]),
         "steady force over that from a notch": steady[0].force / steady[1].force,
         "steady force over the toughness": steady[0].force / setting.bond.toughness,
-        "work until the puncture over that from a notch": float(works[0] / works[1]),
+        "work until the puncture over that from a notch": works[0] / works[1],
         "penetration over the size along the crack": float(intact["penetration"].max() / rule.size),
         "largest closure": float(np.abs(intact["energy_closure"]).max()),
         "steps": float(len(intact["depth"])),
     }
+
+
+def work_until(depth: float, history: History) -> float:
+    """Work of the tool per width until a depth."""
+    return float(
+        np.interp(depth, history["depth"], cumulative_trapezoid(history["force"], history["depth"], initial=0.0))
+    )
 
 
 def check(summary: dict[str, float], settings: list[Setting]) -> None:
@@ -181,6 +196,8 @@ def check(summary: dict[str, float], settings: list[Setting]) -> None:
         assert abs(values["steady force over that from a notch"] - 1) < 0.01, setting.name
         assert values["largest closure"] < 0.01, setting.name
         assert values["penetration over the size along the crack"] < 0.1, setting.name
+        assert values["work until the puncture over that from a notch"] > 1, setting.name
+        assert values["least force after it over the peak"] < 0.9, setting.name
 
 
 if __name__ == "__main__":
