@@ -136,7 +136,7 @@ def same(history, other, tolerance=1e-10):
 
 @pytest.mark.mpi
 def test_a_resumed_run_is_the_uninterrupted_one(folder, first_ranks):
-    """Cut, friction, heat, augmentation, relaxation, inertia, a sliding pair and a tool.
+    """Cut, friction, heat, augmentation, relaxation, inertia, a bond that slides and a tool.
 
     From one rank to another, where it is the same bit for bit; from one to two and back; from one to three.
     """
@@ -151,7 +151,8 @@ def test_a_resumed_run_is_the_uninterrupted_one(folder, first_ranks):
             if count == 1:
                 whole = steps(everything, end)
             # what is to be tried has begun
-            assert all(begun[name][-1] > 0 for name in ("crack_broken", "ball_slipping", "pair_slipping"))
+            columns = ("crack_broken", "pair_broken", "ball_slipping", "pair_slipping")
+            assert all(begun[name][-1] > 0 for name in columns)
         WORLD.barrier()
     whole = WORLD.bcast(whole)
     for before, after in routes:

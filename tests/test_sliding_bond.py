@@ -1,6 +1,7 @@
 """Bonds between surfaces that do not match and slide far: on material partners, contact on the current ones (§3.5)."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,14 +11,18 @@ from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import StepControl
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
+from cutsim.cases import read_case
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
-from cutsim.materials.elastic import LinearElastic
+from cutsim.materials.elastic import LinearElastic, NeoHookean
+from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.solvers.convergence import Tolerances
+from helpers.blocks import make_blocks, separated
 from helpers.boxes import two
 from helpers.fields import wavy
 from helpers.laws import EXPONENTIAL, E
-from helpers.runs import history
-from helpers.tangents import STEPS, Assembled, slopes
+from helpers.runs import LINE_SEARCHES, history
+from helpers.tangents import STEPS, Assembled, Linearised, slopes
 
 KINDS = pytest.mark.parametrize("small_sliding", [False, True], ids=["sliding", "small sliding"])
 
@@ -123,3 +128,105 @@ def test_bond_between_meshes_that_do_not_match(gdim, pull):
     work = np.trapezoid(np.dot(pull, envelope(pull[0] * s, pull[1] * s)), s)
     np.testing.assert_allclose(rows["energy_fracture"][-1], work, rtol=5e-3)
     np.testing.assert_allclose(rows["pair_broken"][-1], 1.0, rtol=5e-3)
+
+
+# -- curved surfaces --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_a_bond_that_has_not_slid_far_is_that_of_a_crack(gdim):
+    """Nodal forces of a deformed crack that is open, from the crack and from a pair of its faces."""
+    b = make_blocks(gdim, comm=MPI.COMM_SELF)
+    crack = b.crack(EXPONENTIAL)
+    pair = SurfacePair(b.state, crack.face("+"), crack.face("-"), EXPONENTIAL, young=E)
+    u = separated(b, 0.1, 0.1, 0.03)
+    expected = Linearised(crack, b.state).forces(u)
+    np.testing.assert_allclose(Assembled(pair, b.state).forces(u), expected, atol=1e-12 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_sliding_over_a_curved_surface_is_no_opening(gdim):
+    """Bent to a cylinder and slid along it by s: the jump is the chord; the normal of one face alone sees s²/2R."""
+    radius, slide = 2.0, 0.4
+    b = two(gdim, n=(5, 4), overhang=0.5, degree=2, comm=MPI.COMM_SELF)
+    pair, up = b.pair(law=EXPONENTIAL), gdim - 1
+
+    def bend(x, along):
+        u = np.zeros_like(x)
+        angle, r = (x[0] + along) / radius, radius + x[up]
+        u[0], u[up] = r * np.sin(angle) - x[0], r * np.cos(angle) - radius - x[up]
+        return u
+
+    for box, along in ((0, 0.0), (1, slide)):
+        b.move(lambda x, along=along: bend(x, along), box)
+    pair.evaluate()
+    jump = pair.passes[0]._now()[1].jump
+    np.testing.assert_allclose(jump[:, 0], 0.0, atol=0.02 * slide**2 / (2 * radius))
+    np.testing.assert_allclose(np.linalg.norm(jump[:, 1:], axis=1), 2 * radius * np.sin(slide / 2 / radius), rtol=1e-3)
+
+
+# -- sheared off, slid on, lifted -------------------------------------------------------------------------------------
+
+# of the case
+LENGTH, TRACTION, FRICTION, SHEAR_MODULUS = 2.0, 0.1, 0.1, 50.0
+
+
+def sheared(elements, comm=MPI.COMM_WORLD):
+    """Columns of the case with a number of elements along the block."""
+    case = read_case(Path(__file__).parent / "validation" / "sheared_bond.toml", {"mesh.set.nx": str(elements)})
+    simulation, rows = case.build(comm), []
+    simulation.run(lambda report: rows.append({name: value for name, (value, _) in report.columns.items()}))
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def expected(way, normal):
+    """Force on the block at a way of its top, sliding of the bond and damage: T = t(δ) + D μ p, the block sheared."""
+    slid = way
+    for _ in range(20):
+        broken = np.maximum(0.0, 1 - np.exp(1 - slid**2))
+        force = LENGTH * 2 * np.sqrt(np.e / 2) * TRACTION * slid * np.exp(-(slid**2)) + FRICTION * broken * normal
+        slid = way - force / (SHEAR_MODULUS * LENGTH)
+    return force, slid, broken
+
+
+def test_a_bond_is_sheared_off_and_slid_on():
+    """Over ten facets of the block and fourteen of the slab: force, work, heat, on two meshes."""
+    forces = []
+    for elements in (5, 10):
+        rows = sheared(elements)
+        normal, way = -rows["press_force"], rows["drive_displacement"]
+        force, slid, broken = expected(way, normal)
+        np.testing.assert_allclose(rows["drive_force"], force, atol=2e-3 * force.max())
+        np.testing.assert_allclose(rows["pair_broken"], LENGTH * broken, atol=0.01)
+        assert rows["pair_slipping"][-2] == pytest.approx(LENGTH) and way[-1] > 10 * LENGTH / 5
+        # pressed down by 0.004 mm, with a penalty of ten elements' stiffness
+        np.testing.assert_allclose(normal[:-1], LENGTH * 100.0 * 0.004 / (1 + 0.5 / 10), rtol=0.01)
+        fracture, friction = rows["energy_fracture"][-1], rows["energy_friction"][-1]
+        assert fracture == pytest.approx(np.sqrt(np.e / 2) * TRACTION * LENGTH, rel=1e-4)
+        assert friction == pytest.approx(np.trapezoid(FRICTION * broken * normal, slid), rel=2e-3)
+        assert np.abs(rows["energy_closure"]).max() < 5e-3
+        assert rows["heat_stored"][-1] == pytest.approx(fracture + friction, rel=1e-8)
+        assert max(abs(rows["drive_force"][-1]), abs(normal[-1])) < 1e-6 * force.max(), "lifted"
+        forces.append(rows["drive_force"])
+    np.testing.assert_allclose(*forces, atol=1e-3 * forces[0].max())
+
+
+@pytest.mark.mpi
+def test_same_on_any_number_of_ranks():
+    """A soft cube that is sheared off a slab in space while it is pressed, in two passes: rows of one rank and all."""
+    if MPI.COMM_WORLD.size == 1:
+        pytest.skip("compares several ranks with one")
+    ends = []
+    for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
+        b = two(3, overhang=0.5, comm=comm)
+        pair = b.pair(law=replace(EXPONENTIAL, shear_strength=0.5), friction=Coulomb(0.3), two_pass=True)
+        path = [lambda t: 0.3 * t, 0.0, lambda t: -0.05 * min(t, 1)]
+        supports = b.drive(0, 0, [0.0] * 3) + b.drive(1, 1, path, "top")
+        terms = [Solid(b.state, NeoHookean(20.0, 0.3)), pair]
+        mechanics = Mechanics(b.state, terms, supports, tolerances=Tolerances(rtol=1e-12))
+        rows = history(mechanics, 2.0, StepControl(first=0.5, largest=0.5, line_searches=LINE_SEARCHES))
+        ends.append({k: v for k, v in rows.items() if "closure" not in k})
+    assert ends[0]["pair_broken"][-1] > 0.9 and ends[0]["pair_slipping"][-1] > 0.9
+    for name in ends[0]:
+        scale = np.abs(ends[0]["pair_force_x"]).max() if "force" in name else 1.0
+        np.testing.assert_allclose(ends[1][name], ends[0][name], rtol=1e-7, atol=1e-8 * scale, err_msg=name)

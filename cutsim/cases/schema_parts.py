@@ -127,8 +127,9 @@ class Pair(Interface):
         master: The other one; without it the first one may fold and meet itself.
         automatic: Whether, in place of a slave and a master, all outer surfaces and faces of cuts may meet each other;
             faces of cracks that press on each other themselves (``closing``) are left out.
-        law: Cohesive law, with small sliding only; by default contact only.
-        small_sliding: Whether each point keeps its partner, as bonds do.
+        law: Cohesive law of a bond, which each point has with the one that it faces in the reference configuration,
+            wherever they slide; by default contact only.
+        small_sliding: Whether contact and friction, too, keep these partners.
         two_pass: Whether each surface is slave once.
         search: Largest distance of a partner; by default the mean size of the slave facets [length].
     """

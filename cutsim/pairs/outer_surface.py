@@ -132,9 +132,13 @@ class SharedSurface:
         V = surface.V
         self._comm: MPI.Comm = V.mesh.comm
         self._surface, self.shape, self._components = surface, surface.shape, V.dofmap.index_map_bs
-        own = surface.owned
-        parts = self._comm.allgather((surface.global_nodes[own], surface.sides[own], surface.reference[own]))
-        self.global_nodes, self.sides, self.reference = (np.concatenate(part) for part in zip(*parts, strict=True))
+        own, face = surface.owned, surface.face
+        # the order of the facets does not depend on the ranks, so that rays through an edge meet the same of its facets
+        labels = np.column_stack([V.mesh.topology.original_cell_index[face.cells], face.local])
+        mine = (labels[own], surface.global_nodes[own], surface.sides[own], surface.reference[own])
+        every, *parts = (np.concatenate(part) for part in zip(*self._comm.allgather(mine), strict=True))
+        self._order = np.lexsort(every.T)
+        self.global_nodes, self.sides, self.reference = (part[self._order] for part in parts)
         # a rank owns consecutive nodes: what the ranks send one after the other is in ascending order
         numbers, places = np.unique(self.global_nodes, return_inverse=True)
         self._places: NDArray[np.intp] = places.reshape(self.global_nodes.shape)
@@ -145,7 +149,7 @@ class SharedSurface:
     @cached_property
     def pieces(self) -> Indices:
         """Connected piece of the mesh to which each facet belongs. Collective."""
-        return np.concatenate(self._comm.allgather(self._surface.pieces[self._surface.owned]))
+        return np.concatenate(self._comm.allgather(self._surface.pieces[self._surface.owned]))[self._order]
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""

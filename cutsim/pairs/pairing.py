@@ -17,6 +17,8 @@ Indices = NDArray[np.int64]
 
 #: How far outside a facet, in reference coordinates, a ray still meets it: no ray slips through between two facets.
 EDGE = 1e-9
+#: Gap that is taken for none, as a fraction of the size of a facet.
+TOUCH = 1e-12
 # Newton iterations for the place on a facet, its accuracy, and how far outside of the facet it is looked for
 _ITERATIONS, _ACCURACY, _OUTSIDE = 20, 1e-14, 1.0
 
@@ -137,6 +139,8 @@ def project(
     # a ray within the plane of a facet meets neither its outside nor its inside
     across = _determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:]))
     outside = sides[facets] * across < -EDGE * size ** derivatives.shape[1]
+    # where surfaces touch, rounding is not to tell which of the facets at an edge is nearer
+    gap[np.abs(gap) <= TOUCH * size] = 0.0
     hit = shape.contains(xi) & (np.abs(gap) <= search) & (off <= EDGE * size) & outside
     order = np.flatnonzero(hit)[np.argsort(points[hit], kind="stable")]
     return Hits(points[order], facets[order], xi[order], gap[order])

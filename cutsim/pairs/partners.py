@@ -8,13 +8,11 @@ from cutsim.fields.points import DEGREE
 from cutsim.pairs.configuration import OnRay, Pairs, Points
 from cutsim.pairs.folding import FoldingSearch
 from cutsim.pairs.outer_surface import Master, SlaveSurface
-from cutsim.pairs.pairing import Array, Hits, Indices
+from cutsim.pairs.pairing import TOUCH, Array, Hits, Indices
 from cutsim.pairs.search import PartnerSearch
 
 #: Degree of the quadrature on a slave surface, by that of the displacement: master facets end within a slave facet.
 DEGREES = {1: DEGREE, 2: 8}
-#: Gap that is taken for none, as a fraction of the mean slave facet's size.
-TOUCH = 1e-12
 
 
 class PairKinematics:

@@ -34,6 +34,9 @@ from helpers.blocks import make_blocks
 from helpers.boxes import stack
 from helpers.laws import NU, E
 
+# so weak that it is sheared off within a few steps
+GLUE = Exponential(toughness=1e-6, opening=0.001, shear_toughness=5e-7, shear_opening=0.001)
+
 
 def coupled(comm=MPI.COMM_WORLD):
     """Inertia, viscosity, a bond that breaks in shear, friction on what is broken, expansion and all kinds of heat."""
@@ -59,9 +62,9 @@ def coupled(comm=MPI.COMM_WORLD):
 
 
 def sliding(comm=MPI.COMM_WORLD):
-    """Two boxes of tetrahedra that rub on each other, the upper one cracked and rubbed by a ball.
+    """Two boxes of tetrahedra that are glued and sheared off each other, the upper one cracked and rubbed by a ball.
 
-    With inertia, relaxation, augmented contact of crack and pair, expansion, and heat across crack and pair.
+    With inertia, relaxation, augmented contact of crack and pair, friction, expansion, and heat across crack and pair.
     """
     boxes = ((0, 0, -1), (1.4, 1, 0), (2, 1, 1)), ((0, 0, 0), (1, 1, 1), (2, 2, 2))
     b = stack(*boxes, simplices=True, comm=comm, cracked=lambda x: np.isclose(x[2], 0.5))
@@ -74,7 +77,7 @@ def sliding(comm=MPI.COMM_WORLD):
         state, glued, (0.0, 0.0, -1.0), law, young=E, contact=contact, friction=Coulomb(0.3, 100.0),
         allowed_penetration=1e-4,
     )  # fmt: skip
-    pair = b.pair(contact=contact, friction=Coulomb(0.2, 100.0), allowed_penetration=1e-4, allowed_slip=1e-3)
+    pair = b.pair(law=GLUE, contact=contact, friction=Coulomb(0.2, 100.0), allowed_penetration=1e-4, allowed_slip=1e-3)
     path = ToolPath.polyline([0.0, 0.1, 2.0], [(0.4, 0.5, 2.0), (0.4, 0.5, 1.97), (0.9, 0.5, 1.97)])
     top = Surface.exterior(state, b.face(1, 2, 1))
     ball = ToolContact(state, Ball(1.0), path, [top], contact=contact, friction=Coulomb(0.3, 100.0), name="ball")
