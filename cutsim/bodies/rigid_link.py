@@ -369,13 +369,13 @@ def _coordinates(
         driven[cast(str, axis)] = machine
     found = []
     for name in names:
-        machine, value = driven.get(name), motion.get(name)
+        drive, value = driven.get(name), motion.get(name)
         unit = radius if name in TURNS else 1.0
-        if machine is not None and value is not None:
+        if drive is not None and value is not None:
             words = f"> 0, since the motion along {name!r} is prescribed"
-            require("stiffness", machine.stiffness, machine.stiffness > 0, words)
+            require("stiffness", drive.stiffness, drive.stiffness > 0, words)
         free = None if value is not None else Machine(name)
-        found.append(Coordinate(name, machine or free, partial(_at, name, value), unit))
+        found.append(Coordinate(name, drive or free, partial(_at, name, value), unit))
     return found
 
 

@@ -213,16 +213,15 @@ class RigidMotion:
         spring = self._k * _mean(old.values - old.path, now.values - now.path)
         work = _mean(old.force, now.force) @ way - spring @ far
         work -= _mean(old.reaction, reaction)[self.held] @ way[self.held]
+        taken = self._numerical(old, acceleration, velocity, way) - float(_mean(old.balance, balance) @ way)
         self._motion.trial = replace(
             now,
             velocity=velocity,
             acceleration=acceleration,
             reaction=reaction,
             balance=balance,
-            viscous=old.viscous + self._d * _mean(old.velocity, velocity) @ way,
-            numerical=old.numerical
-            + self._numerical(old, acceleration, velocity, way)
-            - _mean(old.balance, balance) @ way,
+            viscous=old.viscous + float(self._d * _mean(old.velocity, velocity) @ way),
+            numerical=old.numerical + taken,
             work=float(work),
         )
 

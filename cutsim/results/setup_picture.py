@@ -22,6 +22,7 @@ from cutsim.base.terms import Bonded, Joining, offering
 from cutsim.base.units import Units
 from cutsim.bodies.loads import Support, SurfaceLoad
 from cutsim.bodies.nodal_loads import NodalLoad
+from cutsim.bodies.rigid_link import RigidLink
 from cutsim.bodies.solid import Solid
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.state import State
@@ -144,6 +145,8 @@ def _loaded(problem: Problem) -> Iterator[tuple[str, NDArray[np.int32]]]:
     for term in problem.terms:
         if isinstance(term, SurfaceLoad | NodalLoad):
             yield term.name, term.nodes
+        elif isinstance(term, RigidLink):
+            yield f"{term.name}: rigid", term.nodes
         elif isinstance(term, Joining):
             for facets, side in zip(term.facets, ("slave", "master"), strict=False):
                 yield f"{term.name}: {side}", locate_dofs(V, problem.state.mesh.topology.dim - 1, facets)

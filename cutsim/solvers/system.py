@@ -83,6 +83,8 @@ class System:
         self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers, self.directions)
         self._multipliers = Multipliers(structure.multipliers, u, bcs, self.directions)
         self._borders = Borders(structure.borders, self.comm, self.forces.fixed)
+        if structure.multipliers and self.comm.allreduce(len(self._borders.tied)):
+            raise ValueError("a rigid link cannot move a body with volumetric = 'taylor-hood'; use 'mixed'")
         self._start = self.forces.n + len(self._multipliers.values)
         self.size = int(self.comm.allreduce(len(self.unknowns)))
         self.held = np.concatenate([self.forces.held, self._start + self._borders.held])
