@@ -50,6 +50,7 @@ from .interface.friction import FrictionLaw as FrictionLaw
 from .interface.friction import SmoothCoulomb as SmoothCoulomb
 from .interface.polynomial import Polynomial as Polynomial
 from .interface.ppr import ParkPaulinoRoesler as ParkPaulinoRoesler
+from .interface.rubbing import Friction as Friction
 from .interface.viscous import ViscousBond as ViscousBond
 from .materials.anisotropic import FungOrthotropic as FungOrthotropic
 from .materials.anisotropic import TransverselyIsotropic as TransverselyIsotropic

@@ -13,6 +13,7 @@ from cutsim.fields.points import Surface
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
+from cutsim.interface.rubbing import Friction
 from cutsim.materials.elastic import NeoHookean
 from cutsim.tools.shapes import Ball, ToolPath
 from cutsim.tools.tool_contact import ToolContact
@@ -85,7 +86,7 @@ def test_what_sticks_stays(kind):
     """With augmented friction the ball carries along what it holds, and the audit closes."""
     friction = Coulomb(0.6, 20.0)
     options = {"friction": friction, "allowed_penetration": 10 * ALLOWED, "slide": 0.02, "step": 0.125}
-    held, _ = pressed(kind, 10.0, allowed_slip=1e-5, **options)
+    held, _ = pressed(kind, 10.0, **{**options, "friction": Friction(friction, allowed_slip=1e-5)})
     stiff, _ = pressed(kind, 10.0, **{**options, "friction": Coulomb(0.6, 2e4)})
     soft, _ = pressed(kind, 10.0, **options)
     ends = [rows["tool_force_x"][-1] for rows in (held, stiff, soft)]
@@ -106,7 +107,7 @@ def test_same_on_any_number_of_ranks():
             np.testing.assert_allclose(many[name], one[name], rtol=1e-6, atol=1e-9, err_msg=name)
 
 
-@pytest.mark.parametrize("name", ["allowed_penetration", "allowed_slip"])
+@pytest.mark.parametrize("name", ["allowed_penetration", "friction"])
 @pytest.mark.parametrize("kind", ["smooth", "segments"])
 def test_refusals(kind, name):
     with pytest.raises(ValueError, match=f"{name} = -1"):

@@ -15,6 +15,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.damage import damage
 from cutsim.interface.friction import Coulomb, SmoothCoulomb
+from cutsim.interface.rubbing import Friction
 from cutsim.materials.elastic import LinearElastic
 from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Plane, ToolPath
@@ -36,7 +37,7 @@ def driven(path, law=LAW, gdim=2, bond=None, **options):
     """Two rigid blocks, the upper one on a path: the jump is that of the path."""
     b = make_blocks(gdim)
     crack = b.crack(bond, contact=PenaltyContact(NORMAL))
-    friction = CrackFriction(crack, law, **options)
+    friction = CrackFriction(crack, Friction(law, **options))
     supports = b.drive(b.lower, [0.0] * gdim, "base") + b.drive(b.upper, path, "top")
     return Mechanics(b.state, [crack, friction], supports), friction
 
@@ -184,7 +185,7 @@ def test_augmentation_sticks_within_tolerance():
     b = make_blocks(2, n=4)
     # the normal stays that of the reference, so that the force along x is friction alone
     crack = b.crack(None, contact=PenaltyContact(NORMAL), normal="reference")
-    friction = CrackFriction(crack, Coulomb(MU), allowed_slip=1e-7)
+    friction = CrackFriction(crack, Friction(MU, allowed_slip=1e-7))
     top = b.face(1, 1.0)
     supports = b.drive(b.lower, [0.0, 0.0], "base")
     supports += [Support(b.state, top, 1, lambda t: -DEPTH * min(t, 1.0))]
@@ -216,7 +217,7 @@ def test_where_friction_acts(acts_on, caplog):
         b = make_blocks()
         crack = b.crack(EXPONENTIAL, contact=PenaltyContact(NORMAL))
         remember(crack, past)
-        friction = CrackFriction(crack, Coulomb(MU, 1e6), acts_on=acts_on)
+        friction = CrackFriction(crack, Friction(Coulomb(MU, 1e6), acts_on=acts_on))
         mechanics = Mechanics(b.state, [crack, friction], b.drive(b.lower, [0.0, 0.0]))
         b.move(lambda x: 0 * x, lambda x, o=opening: np.array([0 * x[0] + slide, 0 * x[0] + o]))
         b.state.begin(1.0)
@@ -250,7 +251,7 @@ def test_friction_falls_with_the_hotter_side(hot):
         temperature = Temperature(b.state, space, field)
         crack = b.crack(None, contact=PenaltyContact(NORMAL))
         law = Coulomb(MU, 1e5, T_ref=300.0, T_damage=400.0)
-        friction = CrackFriction(crack, law, temperature=temperature)
+        friction = CrackFriction(crack, Friction(law, temperature=temperature))
         supports = b.drive(b.lower, [0.0, 0.0]) + b.drive(b.upper, to_and_fro(0.1), "top")
         mechanics = Mechanics(b.state, [crack, friction], supports)
         rows = history(mechanics, 1.5, StepControl.fixed(0.25))
@@ -284,7 +285,7 @@ def elastic_blocks(allowed_slip=None, comm=MPI.COMM_WORLD, gdim=2):
     """Two elastic blocks, pressed and dragged over each other: some points stick while others slip."""
     b = make_blocks(gdim, n=4, comm=comm)
     crack = b.crack(None, contact=PenaltyContact(NORMAL))
-    friction = CrackFriction(crack, LAW, allowed_slip=allowed_slip)
+    friction = CrackFriction(crack, Friction(LAW, allowed_slip=allowed_slip))
     bottom, top = b.face(gdim - 1, 0.0), b.face(gdim - 1, 1.0)
     drag = [0.1, *([0.04] * (gdim - 2)), -0.1]
     supports = [Support(b.state, bottom, i) for i in range(gdim)]
@@ -344,8 +345,9 @@ def test_refuses_a_law(make, message):
 
 
 def test_refuses_an_option():
-    crack = make_blocks().crack(None)
     with pytest.raises(ValueError, match="acts_on = 'all' is not allowed"):
-        CrackFriction(crack, LAW, acts_on="all")
+        Friction(LAW, acts_on="all")
     with pytest.raises(ValueError, match=r"allowed_slip = 0.0 is not allowed"):
-        CrackFriction(crack, LAW, allowed_slip=0.0)
+        Friction(LAW, allowed_slip=0.0)
+    with pytest.raises(ValueError, match="friction = 0.0 is not allowed"):
+        CrackFriction(make_blocks().crack(None), 0.0)

@@ -23,6 +23,7 @@ from cutsim.heat.transfer import HeatTransfer
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb
+from cutsim.interface.rubbing import Friction
 from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.results.output import read_history
@@ -217,7 +218,7 @@ def rubbing(gdim=2, law=None, coulomb=None, comm=MPI.COMM_WORLD, capacity=2.0, h
     b = make_blocks(gdim, 4, comm)
     T = Temperature(b.state, cracked_space(b.state.mesh, ("Lagrange", 1), b.facets), 300.0)
     crack = b.crack(None, contact=PenaltyContact(50.0))
-    friction = CrackFriction(crack, coulomb or Coulomb(0.3, stiffness=1e4), temperature=T)
+    friction = CrackFriction(crack, Friction(coulomb or Coulomb(0.3, stiffness=1e4), temperature=T))
     law = law or ContactHeat(3.0, 1.0)
     times = (0.0, 1.0, 3.0)
     moved = [

@@ -12,6 +12,7 @@ from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
+from cutsim.interface.rubbing import Friction
 from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.pairs.surface_pair import SurfacePair
 from helpers.boxes import stack, two
@@ -172,10 +173,9 @@ def test_from_stick_to_slip_without_penetration(gdim, slave):
     b = stack(slab, block)
     faces = b.face(0, up, 1), b.face(1, up, 0)
     options = {
-        "friction": Coulomb(mu),
+        "friction": Friction(mu, allowed_slip=1e-4 * h),
         "contact": PenaltyContact(40 * E / h),
         "allowed_penetration": 1e-4 * h,
-        "allowed_slip": 1e-4 * h,
     }
     pair = SurfacePair(b.state, faces[slave], faces[1 - slave], young=E, **options)
     rigid = [Support(b.state, b.cells(0), i, 0.0, dim=gdim) for i in range(gdim)]
@@ -280,7 +280,7 @@ def test_rollback():
     ends = []
     for disturbed in (False, True):
         b = two(2, overhang=0.5)
-        pair = b.pair(friction=Coulomb(0.3), allowed_penetration=1e-3, allowed_slip=1e-3, two_pass=True)
+        pair = b.pair(friction=Friction(0.3, allowed_slip=1e-3), allowed_penetration=1e-3, two_pass=True)
         path = [lambda t: 0.1 * t, lambda t: -0.02 * min(t, 1)]
         supports = b.drive(0, 0, [0.0, 0.0]) + b.drive(1, 1, path)
         mechanics = Mechanics(b.state, [Solid(b.state, NeoHookean(E, 0.3)), pair], supports)
@@ -319,7 +319,7 @@ BAD = {
     "young": {"young": 0.0},
     "search": {"search": -1.0},
     "allowed_penetration": {"allowed_penetration": 0.0},
-    "allowed_slip": {"allowed_slip": -1.0},
+    "friction": {"friction": -1.0},
 }
 
 

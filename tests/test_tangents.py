@@ -7,6 +7,7 @@ from cutsim.fields.points import Surface
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.friction import Coulomb
+from cutsim.interface.rubbing import Friction
 from cutsim.materials.elastic import LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.rubbers import MooneyRivlin
 from cutsim.tools.pointed import Blade
@@ -134,7 +135,7 @@ def test_friction_on_a_crack(case, gdim, normal):
 def test_friction_on_an_intact_bond(acts_on):
     b = make_blocks()
     crack = b.crack(EXPONENTIAL, contact=PenaltyContact(30.0))
-    term = CrackFriction(crack, Coulomb(0.4, 1e4), acts_on=acts_on)
+    term = CrackFriction(crack, Friction(Coulomb(0.4, 1e4), acts_on=acts_on))
     opening = 0.05 if acts_on == "tension" else -0.03
     assert_slope_two(term, b.state, separated(b, 0.07, opening, 1e-3), 0.1)
 

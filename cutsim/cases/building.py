@@ -157,7 +157,7 @@ def _general(domain: Domain) -> Simulation:
     bodies = solids(domain, state, value)
     faces = cracks(domain, bodies)
     rubbing = {friction.crack.name: friction for friction in crack_friction(domain, faces, value)}
-    joined, rigid = pairs(domain, bodies, faces), tools(domain, bodies, faces, value)
+    joined, rigid = pairs(domain, bodies, faces, value), tools(domain, bodies, faces, value)
     parts = Parts(bodies, faces, rubbing, joined, {name: [tool] for name, tool in rigid.items()})
     touching = [*faces.values(), *rubbing.values(), *joined.values(), *rigid.values()]
     terms = [*bodies, *touching, *links(domain, state, faces), *loads(domain, state, bodies)]

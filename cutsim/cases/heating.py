@@ -25,7 +25,6 @@ from cutsim.heat.interface_heat import InterfaceHeat
 from cutsim.heat.pair_heat import PairHeat
 from cutsim.heat.tool_heat import ToolHeat
 from cutsim.heat.transfer import HeatTransfer
-from cutsim.tools.tool_contact import ToolContact
 
 # faces of a crack that is given no law: they lie apart wherever the bond has broken
 _FACES = ContactHeat(1.0, 1.0)
@@ -106,8 +105,6 @@ def _exchanges(domain: Domain, heat: schema.Heat, parts: Parts, value: Temperatu
     for name, table in heat.tools.items():
         with refusing(domain.document, "heat", "tools", name):
             for tool in parts.tools[name]:
-                if not isinstance(tool, ToolContact):
-                    raise ValueError("must be a tool of a shape: one of triangles exchanges no heat")
                 given = (
                     None if table.law.adiabatic else heat.initial if table.temperature is None else table.temperature
                 )

@@ -8,6 +8,7 @@ from cutsim.cases.bodies import softest, solid_options, solids
 from cutsim.cases.domains import Domain, Entities
 from cutsim.cases.heating import temperature
 from cutsim.cases.refusals import refused, refusing
+from cutsim.cases.tools import friction_of
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.studies.body import CrackedBody, cracked_state
@@ -42,7 +43,7 @@ def inserted(domain: Domain, mechanics: Mapping[str, Any]) -> tuple[Insertion, T
             shape,
             table.drive,
             notch=table.notch,
-            friction=tool.friction or 0.0,
+            friction=friction_of(tool, value),
             fixture=table.fixture,
             mechanics=mechanics,
         )

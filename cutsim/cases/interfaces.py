@@ -15,6 +15,7 @@ from cutsim.fields.faces import Face
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.crack import Crack
 from cutsim.interface.crack_friction import CrackFriction
+from cutsim.interface.rubbing import Friction
 from cutsim.pairs.contact_surfaces import ContactSurfaces
 from cutsim.pairs.surface_pair import SurfacePair
 
@@ -54,28 +55,36 @@ def crack_friction(
 ) -> Iterator[CrackFriction]:
     """Friction of the cracks that have it, as terms of their own. Collective."""
     for name, table in domain.tables.cracks.items():
-        if table.friction:
-            with refusing(domain.document, "cracks", name):
-                yield CrackFriction(
-                    cracks[name],
-                    table.friction,
-                    acts_on=table.acts_on,
-                    allowed_slip=table.allowed_slip,
-                    temperature=temperature,
-                )
+        with refusing(domain.document, "cracks", name):
+            friction = friction_of(table, temperature)
+            if friction is not None:
+                yield CrackFriction(cracks[name], friction)
 
 
-def pairs(domain: Domain, solids: tuple[Solid, ...], cracks: Mapping[str, Crack]) -> dict[str, SurfacePair]:
+def friction_of(table: schema.Interface, temperature: Temperature | None) -> Friction | None:
+    """Friction of a crack or a pair, None for none."""
+    return Friction(table.friction, table.acts_on, table.allowed_slip, temperature) if table.friction else None
+
+
+def pairs(
+    domain: Domain, solids: tuple[Solid, ...], cracks: Mapping[str, Crack], temperature: Temperature | None
+) -> dict[str, SurfacePair]:
     """Pairs of surfaces of a case by name. Collective.
 
     Raises:
         CaseError: A group is missing, or a pair refuses a parameter.
     """
-    return {name: _pair(domain, solids, cracks, name, table) for name, table in domain.tables.pairs.items()}
+    tables = domain.tables.pairs
+    return {name: _pair(domain, solids, cracks, name, table, temperature) for name, table in tables.items()}
 
 
 def _pair(
-    domain: Domain, solids: tuple[Solid, ...], cracks: Mapping[str, Crack], name: str, table: schema.Pair
+    domain: Domain,
+    solids: tuple[Solid, ...],
+    cracks: Mapping[str, Crack],
+    name: str,
+    table: schema.Pair,
+    temperature: Temperature | None,
 ) -> SurfacePair:
     key = ("pairs", name)
     if table.automatic:
@@ -94,9 +103,8 @@ def _pair(
             table.law,
             young=table.young or young,
             contact=table.contact,
-            friction=table.friction,
+            friction=friction_of(table, temperature),
             allowed_penetration=table.allowed_penetration,
-            allowed_slip=table.allowed_slip,
             small_sliding=table.small_sliding,
             two_pass=table.two_pass,
             search=table.search,

@@ -87,6 +87,7 @@ class Interface(Table):
         friction: Friction coefficient [–], or a law.
         contact: Contact law; by default a penalty of 10 E/h.
         allowed_penetration: If given, the contact is augmented until no point penetrates more than this [length].
+        acts_on: Where friction acts: on the "broken" part of the bond, or wherever there is "contact".
         allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
             [length].
         young: Young's modulus for the automatic penalty; by default that of the softest neighbour [stress].
@@ -96,6 +97,7 @@ class Interface(Table):
     friction: Annotated[Friction, NONNEGATIVE] | None = None
     contact: Contact | None = None
     allowed_penetration: Annotated[Length, POSITIVE] | None = None
+    acts_on: Literal["broken", "contact", "tension"] = "broken"
     allowed_slip: Annotated[Length, POSITIVE] | None = None
     young: Annotated[Stress, POSITIVE] | None = None
 
@@ -106,7 +108,6 @@ class Crack(Interface):
     Args:
         facets: Groups of facets.
         plus: Group of cells on its '+' side, or a direction that points out of them.
-        acts_on: Where friction acts: on the "broken" part of the bond, or wherever there is "contact".
         normal: Normal of the "current" or of the "reference" configuration (small strain).
         closing: Whether closed faces press on the points that they met at the start. Faces that slide over each other
             need false, and a pair of the two, such as ``slave = "glue+"`` with ``master = "glue-"``.
@@ -114,7 +115,6 @@ class Crack(Interface):
 
     facets: Groups
     plus: Annotated[Annotated[Group, Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM]
-    acts_on: Literal["broken", "contact", "tension"] = "broken"
     normal: Literal["current", "reference"] = "current"
     closing: Flag = True
 

@@ -20,6 +20,7 @@ from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
+from cutsim.interface.rubbing import Friction
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import ToolPath
@@ -39,7 +40,7 @@ def tools(
     found: dict[str, RigidTool] = {}
     for name, table in domain.tables.tools.items():
         if isinstance(table, schema.SurfaceTool):
-            found[name] = _triangulated(domain, solids, name, table)
+            found[name] = _triangulated(domain, solids, name, table, temperature)
         else:
             found[name] = _shaped(domain, solids, name, table, cracks, temperature)
     return found
@@ -57,8 +58,7 @@ def _shaped(
     surfaces = [_surface(domain, state, (*key, "surfaces"), surface, cracks) for surface in table.surfaces]
     with refusing(domain.document, *key):
         contact = table.contact or _contact(shape, solids, surfaces)
-        friction = table.friction
-        path = path_of(table)
+        friction, path = friction_of(table, temperature), path_of(table)
         return ToolContact(
             state,
             shape,
@@ -67,29 +67,39 @@ def _shaped(
             contact=contact,
             friction=friction,
             allowed_penetration=table.allowed_penetration,
-            allowed_slip=table.allowed_slip,
-            temperature=temperature,
             name=name,
             machines=machines(table.machines),
         )
 
 
-def _triangulated(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.SurfaceTool) -> TriangulatedTool:
+def friction_of(table: schema.Tool, temperature: Temperature | None) -> Friction | None:
+    """Friction of a tool, None for none."""
+    if not table.friction:
+        return None
+    return Friction(table.friction, allowed_slip=table.allowed_slip, temperature=temperature)
+
+
+def _triangulated(
+    domain: Domain,
+    solids: tuple[Solid, ...],
+    name: str,
+    table: schema.SurfaceTool,
+    temperature: Temperature | None,
+) -> TriangulatedTool:
     key, state = ("tools", name), solids[0].state
     facets = domain.facets((*key, "surfaces"), table.surfaces)
     with refusing(domain.document, *key):
         surface = Triangulation.read(table.file, table.scale, comm=state.mesh.comm)
         contact = table.contact or _contact(None, solids, [Surface.exterior(state, facets)])
-        path = path_of(table)
+        friction, path = friction_of(table, temperature), path_of(table)
         return TriangulatedTool(
             state,
             facets,
             surface,
             path,
             contact=contact,
-            friction=table.friction,
+            friction=friction,
             allowed_penetration=table.allowed_penetration,
-            allowed_slip=table.allowed_slip,
             search=table.search,
             machines=machines(table.machines),
             name=name,

@@ -1,6 +1,5 @@
 """Heat exchange between slave points and their partners on a master surface (docs/theory.md §3.4, §3.5)."""
 
-import basix
 import numpy as np
 import ufl
 from numpy.typing import NDArray
@@ -12,8 +11,8 @@ from cutsim.fields.points import Values
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.exchange import HeatExchange
-from cutsim.pairs.outer_surface import OuterSurface, SharedSurface
-from cutsim.pairs.pairing import Array, Indices
+from cutsim.pairs.paired_field import PairedField
+from cutsim.pairs.pairing import Array
 from cutsim.pairs.surface_pass import SurfacePass
 
 
@@ -46,12 +45,8 @@ class HeatPass:
     ) -> None:
         self.contact, self._temperature, self._fraction = contact, temperature, law.fracture_fraction
         points, kinematics = contact.points, contact.kinematics
-        self._slave = OuterSurface(temperature.space, kinematics.slave.face)
-        self._master = SharedSurface(OuterSurface(temperature.space, master))
-        places = basix.make_quadrature(self._slave.shape.element.cell_type, points.degree)[0]
-        self._own_values = np.tile(self._slave.shape.values(places)[0], (len(self._slave.owned), 1))
-        self._facets: Indices = np.repeat(np.arange(len(self._slave.owned)), len(places))
-        self._pair()
+        self._field = PairedField(temperature.space, points, kinematics.slave.face, master)
+        self._field.pair(contact.partners().hits)
         self._faces = points.function(2)
         self._feel()
         faces = ufl.variable(points.at(self._faces))
@@ -61,33 +56,14 @@ class HeatPass:
         flat = ufl.as_vector([rates[i, j] for i in range(2) for j in range(2)])
         self._linear = points.evaluator({"fluxes": fluxes, "rates": flat})
 
-    def _pair(self) -> None:
-        """Nodes on which each point acts and their shares: of its own facet, then of that which it faces."""
-        hits = self.contact.partners().hits
-        own = self._slave.global_nodes[self._facets]
-        faced, values = own.copy(), self._own_values.copy()
-        faced[hits.points] = self._master.global_nodes[hits.facets]
-        values[hits.points] = self._master.shape.values(hits.xi)[0]
-        none = np.zeros_like(values)
-        self._hits, self._nodes = hits, np.hstack([own, faced])
-        # shape (points, faces, nodes)
-        self._shares = np.stack([np.hstack([self._own_values, none]), np.hstack([none, values])], axis=1)
-
-    def _at_faces(self, field: Array) -> Array:
-        """Values of a field over the local dofs on both faces, shape (points, 2)."""
-        own = self._slave.gather(field)[self._facets, :, 0]
-        faced = own.copy()
-        faced[self._hits.points] = self._master.gather(field)[self._hits.facets, :, 0]
-        return np.asarray(np.einsum("nfa,na->nf", self._shares, np.hstack([own, faced])))
-
     def _feel(self) -> None:
         """Bring the present temperature to the points."""
-        points, values = self.contact.points, self._at_faces(self._temperature.value.x.array)
+        points, values = self.contact.points, self._field.values(self._temperature.value.x.array)
         points.set(self._faces, values.reshape(*points.weights.shape, 2))
 
     def begin(self) -> None:
         """Take over partners, pressure and dissipation of the mechanical step."""
-        self._pair()
+        self._field.pair(self.contact.partners().hits)
         history, slip = self.contact.history, self.contact.slip
         none: Values = np.zeros_like(self.contact.points.weights)
         friction = none if slip is None else slip.dissipation()
@@ -111,24 +87,25 @@ class HeatPass:
         self._feel()
         fluxes, rates = self._law()
         if along is not None:
-            fluxes = fluxes + np.einsum("nfg,ng->nf", rates, self._at_faces(along))
-        forces = np.einsum("n,nf,nfa->na", self.contact.weights, fluxes, self._shares)
-        b.setValues(self._nodes.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
+            fluxes = fluxes + np.einsum("nfg,ng->nf", rates, self._field.values(along))
+        forces = np.einsum("n,nf,nfa->na", self.contact.weights, fluxes, self._field.shares)
+        b.setValues(self._field.nodes.ravel().astype(PETSc.IntType), forces.ravel(), addv=PETSc.InsertMode.ADD)
 
     def add_tangent(self, A: PETSc.Mat) -> None:
         """Add the tangent, as `cutsim.base.terms.Assembler.add_tangent`."""
         rates = self._law()[1]
         rows = np.flatnonzero(rates.any(axis=(1, 2)) & (self.contact.weights > 0))
-        weighted, shares = self.contact.weights[rows, None, None] * rates[rows], self._shares[rows]
-        add_blocks(A, self._nodes[rows], shares.transpose(0, 2, 1) @ weighted @ shares)
+        weighted, shares = self.contact.weights[rows, None, None] * rates[rows], self._field.shares[rows]
+        add_blocks(A, self._field.nodes[rows], shares.transpose(0, 2, 1) @ weighted @ shares)
 
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros, as `cutsim.base.terms.Assembler.add_pattern`."""
         facets = self.contact.kinematics.facets
-        near = [f[self._slave.owned[facets[0]]] for f in facets]
-        own = self._slave.global_nodes
-        facing = np.hstack([own[near[0]], self._master.global_nodes[near[1]]])
-        for nodes in (own[self._slave.owned], facing):
+        near = [f[self._field.slave.owned[facets[0]]] for f in facets]
+        own = self._field.slave.global_nodes
+        assert self._field.master is not None
+        facing = np.hstack([own[near[0]], self._field.master.global_nodes[near[1]]])
+        for nodes in (own[self._field.slave.owned], facing):
             add_blocks(A, nodes, np.zeros((*nodes.shape, nodes.shape[1])))
 
     def _law(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -13,7 +13,7 @@ from cutsim.base.terms import Columns
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.contact_heat import HeatLaw
 from cutsim.heat.exchange import ExchangeTerm, HeatExchange
-from cutsim.tools.tool_contact import ToolContact
+from cutsim.tools.rigid_tool import RigidTool
 
 
 class ToolHeat(ExchangeTerm):
@@ -36,7 +36,7 @@ class ToolHeat(ExchangeTerm):
     def __init__(
         self,
         temperature: Temperature,
-        tool: ToolContact,
+        tool: RigidTool,
         law: HeatLaw,
         tool_temperature: float | TimeFunction | None = None,
         *,
@@ -52,19 +52,21 @@ class ToolHeat(ExchangeTerm):
             if tool_temperature is None
             else Schedule(self.state.mesh, self.state.memory, tool_temperature, "tool_temperature", self.name)
         )
-        self._check()
+        self._warm()
         self._exchanges = [
             HeatExchange(temperature, patch.surface.points, law, body, self._opposite(body), self.name)
-            for patch in tool.patches
+            for patch in tool.touched
             for body in [patch.surface.restrict(temperature.value)]
         ]
 
     def _opposite(self, body: Expr) -> Expr:
         return body if self._tool_temperature is None else self._tool_temperature.constant
 
-    def _check(self) -> None:
+    def _warm(self) -> None:
+        """Let the friction of the tool feel its temperature."""
         if self._tool_temperature is not None:
             self.temperature.check("tool_temperature", self._tool_temperature.value)
+            self.tool.temperature.value = self._tool_temperature.value
 
     @property
     def exchanges(self) -> Sequence[HeatExchange]:
@@ -73,7 +75,7 @@ class ToolHeat(ExchangeTerm):
 
     def residual(self, w: Expr) -> ufl.Form:
         """Heat that leaves the body through the surfaces."""
-        parts = zip(self.exchanges, self.tool.patches, strict=True)
+        parts = zip(self.exchanges, self.tool.touched, strict=True)
         return sum((e.fluxes[0] * p.surface.restrict(w) * p.surface.measure for e, p in parts), start=ufl.Form([]))
 
     def begin(self) -> None:
@@ -84,8 +86,8 @@ class ToolHeat(ExchangeTerm):
         """
         if self._tool_temperature is not None:
             self._tool_temperature.begin(self.state.time)
-            self._check()
-        for exchange, patch in zip(self.exchanges, self.tool.patches, strict=True):
+            self._warm()
+        for exchange, patch in zip(self.exchanges, self.tool.touched, strict=True):
             exchange.begin(patch.pressure(), patch.dissipation(), np.zeros_like(exchange.points.weights))
 
     def heat_flow(self) -> float:

@@ -30,10 +30,9 @@ from cutsim.interface.crack_faces import CrackFaces
 from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.crack_viscosity import CrackViscosity
 from cutsim.interface.doubts import doubt_law, doubt_penetration
-from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.path_measure import PathMeasure
-from cutsim.interface.slip import check_friction
+from cutsim.interface.rubbing import AnyFriction, check_friction
 from cutsim.interface.viscous import ViscousBond
 
 #: Fields of a crack for output.
@@ -53,8 +52,7 @@ class Crack(Term):
         young: Young's modulus of the softer neighbour, for the automatic penalty and the mesh check [stress].
         name: Name in messages and output.
         contact: Contact law of the closed crack; by default a penalty of 10 E/h.
-        friction: Friction law, or the coefficient of Coulomb's, None for none; it acts where the bond is broken. For
-            other options `CrackFriction` is a term of its own, beside a crack without this.
+        friction: Friction, a friction law, or the coefficient of Coulomb's, None for none.
         allowed_penetration: If given, Uzawa augmentation until no point penetrates more than this [length].
         normal: "current" mid-surface normal (large rotation) or "reference" (small strain).
         closing: Whether closed faces press on the points that they met in the reference configuration. Faces that slide
@@ -89,7 +87,7 @@ class Crack(Term):
         young: float,
         name: str = "crack",
         contact: PenaltyContact | None = None,
-        friction: FrictionLaw | float | None = None,
+        friction: AnyFriction = None,
         allowed_penetration: float | None = None,
         normal: Literal["current", "reference"] = "current",
         closing: bool = True,

@@ -1,82 +1,17 @@
 """Slip history at integration points: anchor, traction and dissipation of friction (docs/theory.md §3.3)."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 import ufl
 from ufl.algorithms.analysis import extract_constants
 
-from cutsim.base.checks import nonnegative, require_number
-from cutsim.base.functions import positive_part
-from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
-from cutsim.interface.friction import Coulomb, FrictionLaw
+from cutsim.interface.friction import FrictionLaw
+from cutsim.interface.rubbing import Friction, Rubbing
 
 # advance relative to the slip below which a point sticks
 _STICKS = 1e-9
-
-
-def check_friction(name: str, friction: FrictionLaw | float | None) -> None:
-    """Refuse what is neither a friction law nor the coefficient of Coulomb's, nor None.
-
-    Raises:
-        ValueError: It is something else, or a negative number.
-    """
-    if not isinstance(friction, FrictionLaw):
-        require_number(name, friction, nonnegative.or_none)
-
-
-def completed(friction: FrictionLaw | float, stiffness: float) -> FrictionLaw:
-    """The law as it acts on a contact, with a tangential penalty where it needs one.
-
-    Args:
-        friction: A law, or the coefficient of Coulomb's.
-        stiffness: Penalty of the normal contact [stress/length].
-    """
-    law = friction if isinstance(friction, FrictionLaw) else Coulomb(float(friction))
-    return law.on_penalty(stiffness)
-
-
-def _closed(before: Expr, now: Expr) -> Expr:
-    """Fraction of a step after closure, from the penetration at both ends, if it changes evenly."""
-    depth = positive_part(now)
-    return ufl.conditional(ufl.lt(before, 0), depth / (depth - before), 1.0)
-
-
-@dataclass(frozen=True)
-class Rubbing:
-    """Slip and pressure at the points of a surface, as expressions of the displacement.
-
-    Attributes:
-        slip: Slip s, a vector of components in a frame that turns with the surface [length].
-        pressure: Contact pressure [stress].
-        penetration: Penetration δ that goes with the pressure, negative while the point is open [length].
-        share: Fraction of the area on which friction acts, in [0, 1].
-        project: Projection of a slip to the tangential plane, if the frame is not tangential by itself.
-        temperature: Temperature of the hotter side, for laws that need it.
-    """
-
-    slip: Expr
-    pressure: Expr
-    penetration: Expr
-    share: Expr = 1.0
-    project: Callable[[Expr], Expr] = lambda slip: slip
-    temperature: Expr | None = None
-
-    def slid(self, start: Expr, carried: Expr, before: Expr) -> tuple[Expr, Expr, Expr]:
-        """Slide of the step, its fraction after closure, and the slip that the law resists.
-
-        Args:
-            start: Slip at the start of the step.
-            carried: Elastic slip at that time.
-            before: Penetration at that time.
-        """
-        closed = _closed(before, self.penetration)
-        slid = self.project(self.slip - start)
-        return slid, closed, closed * slid + self.project(carried)
 
 
 class SlipHistory:
@@ -94,28 +29,20 @@ class SlipHistory:
         state: Displacement and time.
         name: Name of the surface.
         points: Integration points.
-        law: Friction law with a tangential penalty.
+        friction: Friction, whose law has a tangential penalty.
         rubbing: Slip and pressure.
-        tolerance: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
 
     Attributes:
         traction: Traction along the slip, on the whole area, in the frame of the slip [stress].
     """
 
-    def __init__(
-        self,
-        state: State,
-        name: str,
-        points: FacetPoints,
-        law: FrictionLaw,
-        rubbing: Rubbing,
-        *,
-        tolerance: float | None = None,
-    ) -> None:
-        self.points, self._tolerance, self._compliance = points, tolerance, law.compliance
+    def __init__(self, state: State, name: str, points: FacetPoints, friction: Friction, rubbing: Rubbing) -> None:
+        law = friction.law
+        assert isinstance(law, FrictionLaw), "completed"
+        self.points, self._tolerance, self._compliance = points, friction.allowed_slip, law.compliance
         self._dt = state.dt
         # augmentation leaves no elastic slip that energy is stored in
-        self._elastic = law.compliance if tolerance is None else 0.0
+        self._elastic = law.compliance if self._tolerance is None else 0.0
         symbolic: FrictionLaw = with_constants(state.mesh, law)
         n = len(rubbing.slip)
         # one function for slip at the start of the step, elastic slip and penetration: each costs a form a coefficient

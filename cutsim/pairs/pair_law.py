@@ -1,7 +1,7 @@
 """Interface law at points whose jump is not computed by a form (docs/theory.md §3, 3.5)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import ufl
@@ -13,10 +13,10 @@ from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
-from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.modified_contact import respond
-from cutsim.interface.slip import Rubbing, SlipHistory
+from cutsim.interface.rubbing import Friction, Rubbing
+from cutsim.interface.slip import SlipHistory
 from cutsim.interface.viscous import ViscousBond, ViscousHistory
 from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.pairing import Array
@@ -29,16 +29,14 @@ class PairLaws:
     Args:
         cohesive: Cohesive law, None for a broken interface.
         contact: Contact law.
-        friction: Friction law with a tangential penalty, None for none; it acts on the broken fraction.
+        friction: Friction whose law has a tangential penalty, None for none.
         allowed_penetration: Largest mean penetration of a facet after augmentation [length]; None for no augmentation.
-        allowed_slip: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
     """
 
     cohesive: CohesiveLaw | None
     contact: PenaltyContact
-    friction: FrictionLaw | None
+    friction: Friction | None
     allowed_penetration: float | None
-    allowed_slip: float | None
 
 
 class PairLaw:
@@ -54,6 +52,7 @@ class PairLaw:
         laws: The laws.
         history: What the points remember of opening and damage.
         pairs: The points and their partners at the start, of one kind or two.
+        temperature: Temperature of the hotter side, for friction that depends on it.
 
     Attributes:
         slip: What the points remember of friction, or None.
@@ -69,6 +68,7 @@ class PairLaw:
         laws: PairLaws,
         history: InterfaceHistory,
         pairs: Sequence[Pairs],
+        temperature: Expr | None,
     ) -> None:
         self._points, self._laws, self._history = points, laws, history
         self._dim, self._kinds = state.mesh.geometry.dim, len(pairs)
@@ -98,12 +98,11 @@ class PairLaw:
         self.slip: SlipHistory | None = None
         friction = 0 * slides[0]
         if laws.friction is not None:
-            share = 1 - bonded * (1 - bond.damage[1])
             # how a point without partner comes near is not known
-            depth = points.at(self._met) * touch.penetration
-            rubbing = Rubbing(slides[0], touch.pressure, depth, share=share)
-            self.slip = SlipHistory(state, name, points, laws.friction, rubbing, tolerance=laws.allowed_slip)
-            friction = share * self.slip.traction
+            near = replace(touch, penetration=points.at(self._met) * touch.penetration)
+            rubbing = Rubbing.beside(laws.friction, slides[0], near, bond, bonded=bonded, temperature=temperature)
+            self.slip = SlipHistory(state, name, points, laws.friction, rubbing)
+            friction = rubbing.share * self.slip.traction
         tractions = [ufl.as_vector([-touch.pressure, *friction])]
         cohesive = ufl.as_vector([bond.tension, *bond.shear])
         self.viscous: ViscousHistory | None = None

@@ -20,8 +20,7 @@ from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
-from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import check_friction, completed
+from cutsim.interface.rubbing import AnyFriction, check_friction, completed
 from cutsim.pairs.material_partners import MaterialPartners
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface, SlaveSurface
 from cutsim.pairs.pair_law import PairLaws
@@ -50,13 +49,10 @@ class SurfacePair(Term):
             they slide; None for contact only.
         young: Young's modulus of the softer body, for the automatic penalty [stress].
         contact: Contact law; by default a penalty of 10 E/h.
-        friction: Friction law, or the coefficient of Coulomb's, None for none; without a tangential penalty of its own
-            it takes that of the contact. It acts where there is no bond, and on the broken fraction of one.
+        friction: Friction, a friction law, or the coefficient of Coulomb's, None for none.
         small_sliding: Whether contact and friction, too, act between the points that face each other in the reference
             configuration. Otherwise their partners are found in the current configuration.
         allowed_penetration: If given, Uzawa augmentation until no facet penetrates more than this, in the mean
-            [length].
-        allowed_slip: If given, augmentation until no sticking facet slides more than this in a step, in the mean
             [length].
         two_pass: Whether each surface is slave once; one that meets itself always is.
         search: Largest distance of a partner, on either side [length]; by default the mean size of the slave facets.
@@ -89,9 +85,8 @@ class SurfacePair(Term):
         *,
         young: float,
         contact: PenaltyContact | None = None,
-        friction: FrictionLaw | float | None = None,
+        friction: AnyFriction = None,
         allowed_penetration: float | None = None,
-        allowed_slip: float | None = None,
         small_sliding: bool = False,
         two_pass: bool = False,
         search: float | None = None,
@@ -100,7 +95,6 @@ class SurfacePair(Term):
         require_number("young", young, positive)
         check_friction("friction", friction)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
-        require_number("allowed_slip", allowed_slip, positive.or_none)
         require_number("search", search, positive.or_none)
         self.folding = master_facets is None
         lasting = self.folding and small_sliding
@@ -115,8 +109,7 @@ class SurfacePair(Term):
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
             doubt_law(state.verdict, name, law, young, size)
-        rubbing = completed(friction, self.contact.stiffness) if friction else None
-        laws = PairLaws(law, self.contact, rubbing, allowed_penetration, allowed_slip)
+        laws = PairLaws(law, self.contact, completed(friction, self.contact.stiffness), allowed_penetration)
         self.sides = Face.joined(slaves), Face.joined(masters or slaves)
         owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
         self.entities = rows([*slaves, *masters], owned).ravel()

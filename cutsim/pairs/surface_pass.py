@@ -8,6 +8,7 @@ from petsc4py import PETSc
 
 from cutsim.base.assembly import owned_vector
 from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr
 from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
@@ -15,8 +16,10 @@ from cutsim.interface.history import GAUSS, TRAPEZOID, InterfaceHistory
 from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.material_partners import MaterialPartners
 from cutsim.pairs.nodal_forces import Action, Coupling
+from cutsim.pairs.outer_surface import SharedSurface
 from cutsim.pairs.pair_forces import PairForces, add_pattern
 from cutsim.pairs.pair_law import PairLaw, PairLaws
+from cutsim.pairs.paired_field import HotterSide
 from cutsim.pairs.pairing import Array
 from cutsim.pairs.partners import DEGREES, PairKinematics
 
@@ -48,6 +51,7 @@ class SurfacePass:
             for the bond.
         laws: Laws.
         weight: Factor of the virtual work.
+        tool: Temperature of a rigid master, as friction feels it.
 
     Attributes:
         points: Integration points.
@@ -68,6 +72,7 @@ class SurfacePass:
         laws: PairLaws,
         *,
         weight: float,
+        tool: Expr | None = None,
     ) -> None:
         self._state, self.points, self.kinematics, self.weight = state, points, kinematics[0], weight
         self._all = tuple(kinematics)
@@ -76,10 +81,21 @@ class SurfacePass:
         self.weights = weight * own.ravel()
         rule = GAUSS if isinstance(self.kinematics, MaterialPartners) else TRAPEZOID
         self.history = InterfaceHistory(state.memory, name, points, laws.cohesive, rule, ("held",))
-        self._law = PairLaw(state, name, points, laws, self.history, self._pairs_at(self._start()))
+        self._warmth = self._hotter_side(laws, tool)
+        felt = None if self._warmth is None else self._warmth.value
+        self._law = PairLaw(state, name, points, laws, self.history, self._pairs_at(self._start()), felt)
         self.slip, self.viscous = self._law.slip, self._law.viscous
         self._seen: Array | None = None
         self._force = state.memory.value(f"{name}: force", np.zeros(self._dim))
+
+    def _hotter_side(self, laws: PairLaws, tool: Expr | None) -> HotterSide | None:
+        """What friction feels of a temperature."""
+        temperature = None if laws.friction is None else laws.friction.temperature
+        if temperature is None:
+            return None
+        slave, master = self.kinematics.slave.face, self.kinematics.master
+        met = master.face if isinstance(master, SharedSurface) else None
+        return HotterSide(temperature, self.points, slave, met, tool)
 
     @property
     def force(self) -> Array:
@@ -119,6 +135,8 @@ class SurfacePass:
         for kinematics in self._all:
             kinematics.begin(self._start())
         self._seen = None
+        if self._warmth is not None:
+            self._warmth.feel(self.partners().hits)
 
     def evaluate(self) -> None:
         """Trial history, and the force on the slave, of the converged trial displacement."""

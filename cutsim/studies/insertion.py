@@ -16,8 +16,7 @@ from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.fields.state import State
 from cutsim.interface.crack import Crack
-from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import check_friction, completed
+from cutsim.interface.rubbing import AnyFriction, check_friction, completed
 from cutsim.results.recording import Columns
 from cutsim.studies.body import CrackedBody
 from cutsim.studies.cut_area import CutArea
@@ -75,7 +74,7 @@ class Insertion:
         drive: Drive,
         *,
         notch: float = 0.0,
-        friction: FrictionLaw | float | None = None,
+        friction: AnyFriction = None,
         fixture: Fixture = STANDING,
         mechanics: Mapping[str, Any] | None = None,
     ) -> Self:
@@ -86,7 +85,7 @@ class Insertion:
             tool: The whole tool (side 0); a blade, or in a body of revolution and in space a needle.
             drive: Its motion.
             notch: Depth of the notch in which the tool is inserted, 0 for a body without one [length].
-            friction: Friction law of tool and body, or the coefficient of Coulomb's; None for none.
+            friction: Friction of tool and body, a law, or the coefficient of Coulomb's; None for none.
             fixture: Names of groups of the mesh, and how the body is held.
             mechanics: Further arguments of `Mechanics`, such as ``{"analysis": "dynamic"}``.
 
@@ -186,7 +185,7 @@ def _contacts(
     frame: Frame,
     motion: Motion,
     top: tuple[str, str],
-    friction: FrictionLaw | float | None,
+    friction: AnyFriction,
 ) -> tuple[ToolContact, ...]:
     """The tool on each face of each part of the crack."""
     plus = frame.side(body.cracks[0])

@@ -2,6 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
 from dolfinx import default_scalar_type, fem
@@ -11,6 +12,7 @@ from cutsim.base.checks import as_array, require
 from cutsim.base.rotations import rotation_matrix, rotation_vector
 from cutsim.base.terms import Border, Term
 from cutsim.bodies.machine import Machine
+from cutsim.fields.points import Surface, Values
 from cutsim.fields.state import State
 from cutsim.interface.doubts import doubt_penetration
 from cutsim.interface.slip import SlipHistory
@@ -18,7 +20,23 @@ from cutsim.tools.driven_tool import DrivenTool, Guide
 from cutsim.tools.shapes import ToolPath
 
 _AXES = "xyz"
+# a tool of unknown temperature is never the hotter side
+_COLD = -1e30
 _Action = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+class Touched(Protocol):
+    """Protocol of a surface of the body that a tool touches, as heat uses it."""
+
+    @property
+    def surface(self) -> Surface:
+        """The surface."""
+
+    def pressure(self) -> Values:
+        """Present contact pressure at its points [stress]. Collective."""
+
+    def dissipation(self) -> Values:
+        """Friction dissipation of the trial step at its points [energy per reference area]."""
 
 
 class RigidTool(Term, ABC):
@@ -34,6 +52,7 @@ class RigidTool(Term, ABC):
     Attributes:
         position: Present position of the reference point [length].
         rotation: Present rotation R, a matrix: a point x of the body lies at Rᵀ(x − position) in the tool's frame.
+        temperature: Temperature of the tool, as friction feels it; `cutsim.heat.tool_heat` knows it.
 
     Raises:
         ValueError: The path has another dimension than the mesh, or turns the tool of a body of revolution.
@@ -48,6 +67,8 @@ class RigidTool(Term, ABC):
         self.position, self.rotation = fem.Constant(state.mesh, position), fem.Constant(state.mesh, rotation)
         self._position = state.memory.array(f"{name}: position", self.position)
         self._rotation = state.memory.array(f"{name}: rotation", self.rotation)
+        self.temperature = fem.Constant(state.mesh, default_scalar_type(_COLD))
+        state.memory.array(f"{name}: temperature", self.temperature)
         none: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
         self._action = state.memory.value(f"{name}: force and moment", none)
         self._guide = Guide(state, name, lambda t: _pose(path, t, gdim), machines) if machines else None
@@ -58,6 +79,11 @@ class RigidTool(Term, ABC):
     def slips(self) -> Sequence[SlipHistory]:
         """Memory of friction of the surfaces that the tool touches."""
         return ()
+
+    @property
+    @abstractmethod
+    def touched(self) -> Sequence[Touched]:
+        """The surfaces of the body that it can touch."""
 
     @property
     def corners(self) -> tuple[float, ...]:

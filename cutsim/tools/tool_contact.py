@@ -19,11 +19,10 @@ from cutsim.bodies.machine import Machine
 from cutsim.fields.points import Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
-from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
-from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.multiplier import ContactMultiplier
-from cutsim.interface.slip import Rubbing, SlipHistory, check_friction, completed
+from cutsim.interface.rubbing import AnyFriction, Friction, Rubbing, check_friction, completed, hotter
+from cutsim.interface.slip import SlipHistory
 from cutsim.tools.driven_tool import DrivenContact
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
@@ -36,15 +35,13 @@ class ToolLaws:
 
     Args:
         contact: Contact law.
-        friction: Friction law with a tangential penalty, None for none.
+        friction: Friction whose law has a tangential penalty, None for none.
         allowed_penetration: Largest mean penetration of a facet after augmentation [length]; None for no augmentation.
-        allowed_slip: Largest mean slip in a step of a facet that sticks [length]; None for no augmentation.
     """
 
     contact: PenaltyContact
-    friction: FrictionLaw | None
+    friction: Friction | None
     allowed_penetration: float | None = None
-    allowed_slip: float | None = None
 
 
 class Patch:
@@ -57,7 +54,7 @@ class Patch:
         shape: Signed distance of the tool.
         pose: Its present position and rotation.
         laws: Laws of the contact.
-        temperature: Temperature of the body, for friction laws that depend on it.
+        temperature: Temperature of the tool.
 
     Attributes:
         surface: The surface.
@@ -76,7 +73,7 @@ class Patch:
         shape: Shape,
         pose: tuple[Expr, Expr],
         laws: ToolLaws,
-        temperature: Temperature | None,
+        temperature: fem.Constant,
     ) -> None:
         self.surface, points = surface, surface.points
         position, self._rotation = pose
@@ -97,14 +94,15 @@ class Patch:
         self._facing = ufl.dot(surface.restrict(_outward(state)), self._rotation * normal)
         self.slip: SlipHistory | None = None
         if laws.friction is not None:
+            body = laws.friction.temperature
             rubbing = Rubbing(
                 self.place,  # it changes by the slip relative to the tool, which moves and turns
                 self._pressure,
                 held,
                 project=lambda slip: tangential(slip, normal),
-                temperature=None if temperature is None else surface.restrict(temperature.value),
+                temperature=None if body is None else hotter(surface.restrict(body.value), temperature),
             )
-            self.slip = SlipHistory(state, name, points, laws.friction, rubbing, tolerance=laws.allowed_slip)
+            self.slip = SlipHistory(state, name, points, laws.friction, rubbing)
         self._known: Remembered[dict[str, Values]] | None = None
         if self._multiplier is not None:
             start = {"work": np.zeros_like(points.weights), **self.contact()}
@@ -187,13 +185,10 @@ class ToolContact(RigidTool):
         path: Motion of its reference point, and rotation about it.
         surfaces: Surfaces the tool can touch; each side of a crack by itself.
         contact: Contact law; the pressure acts per reference area.
-        friction: Friction law against the slip relative to the tool, or the coefficient of Coulomb's, None for none;
-            without a tangential penalty of its own it takes that of the contact law.
+        friction: Friction against the slip relative to the tool, a friction law, or the coefficient of Coulomb's, None
+            for none.
         allowed_penetration: If given, the contact is augmented until the mean penetration of no facet that is pressed
             as a whole is larger [length].
-        allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
-            [length].
-        temperature: Temperature of the body, for friction laws that depend on it.
         name: Name in messages and output.
         machines: What drives the tool along some axes, each one unknown; along these the path is that of the machine.
 
@@ -214,30 +209,23 @@ class ToolContact(RigidTool):
         surfaces: Sequence[Surface],
         *,
         contact: PenaltyContact,
-        friction: FrictionLaw | float | None = None,
+        friction: AnyFriction = None,
         allowed_penetration: float | None = None,
-        allowed_slip: float | None = None,
-        temperature: Temperature | None = None,
         name: str = "tool",
         machines: Sequence[Machine] = (),
     ) -> None:
         check_friction("friction", friction)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
-        require_number("allowed_slip", allowed_slip, positive.or_none)
         super().__init__(state, path, name, machines)
         require("surfaces", len(surfaces), len(surfaces) > 0, "at least one surface")
         check_directions(shape, state.mesh.geometry.dim)
         self.shape, self.contact, self.friction = shape, contact, friction
-        law = completed(friction, contact.stiffness) if friction else None
-        self.symmetric = law is None
-        position, rotation, laws = (
-            self.position,
-            self.rotation,
-            ToolLaws(contact, law, allowed_penetration, allowed_slip),
-        )
-        # forms that are differentiated by the pose name it
-        pose = (ufl.variable(position), ufl.variable(rotation)) if machines else (position, rotation)
-        self.patches = tuple(Patch(state, name, s, shape, pose, laws, temperature) for s in surfaces)
+        laws = ToolLaws(contact, completed(friction, contact.stiffness), allowed_penetration)
+        self.symmetric = laws.friction is None
+        pose = self.position, self.rotation
+        if machines:  # forms that are differentiated by the pose name it
+            pose = ufl.variable(self.position), ufl.variable(self.rotation)
+        self.patches = tuple(Patch(state, name, s, shape, pose, laws, self.temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
         if self._guide is not None:
@@ -266,6 +254,11 @@ class ToolContact(RigidTool):
     def entity_maps(self) -> EntityMaps:
         """Maps from facets of the mesh to the points of the surfaces."""
         return {mesh: cells for p in self.patches for mesh, cells in p.surface.points.entity_maps.items()}
+
+    @property
+    def touched(self) -> Sequence[Patch]:
+        """The tool on each surface."""
+        return self.patches
 
     @property
     def slips(self) -> Sequence[SlipHistory]:

@@ -16,12 +16,13 @@ from cutsim.base.signatures import checked
 from cutsim.base.terms import Assembler
 from cutsim.bodies.machine import Machine
 from cutsim.fields.faces import Face
+from cutsim.fields.points import Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.space import locate_dofs
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
-from cutsim.interface.friction import FrictionLaw
-from cutsim.interface.slip import SlipHistory, check_friction, completed
+from cutsim.interface.rubbing import AnyFriction, check_friction, completed
+from cutsim.interface.slip import SlipHistory
 from cutsim.pairs.outer_surface import OuterSurface, SlaveSurface
 from cutsim.pairs.overlap import inside_surface
 from cutsim.pairs.pair_forces import dofs_of
@@ -81,6 +82,19 @@ class _Touch(SurfacePass):
         """Find the partners anew: the rigid surface has moved."""
         self._seen = None
 
+    @property
+    def surface(self) -> Surface:
+        """The surface of the body."""
+        return Surface(self.points)
+
+    def pressure(self) -> Values:
+        """Contact pressure of the trial step at the points [stress]."""
+        return self.history.trial["pressure"]
+
+    def dissipation(self) -> Values:
+        """Friction dissipation of the trial step at the points [energy per reference area]."""
+        return np.zeros_like(self.points.weights) if self.slip is None else self.slip.dissipation()
+
     def add_pattern(self, A: PETSc.Mat) -> None:
         """Add zeros for all facets. Collective."""
         slave = self.kinematics.slave
@@ -100,12 +114,10 @@ class TriangulatedTool(RigidTool):
         surface: Surface of the tool relative to its reference point, the same on all ranks.
         path: Motion of the reference point, and rotation about it.
         contact: Contact law; the pressure acts per reference area.
-        friction: Friction law, or the coefficient of Coulomb's, None for none; without a tangential penalty of its own
-            it takes that of the contact law.
+        friction: Friction against the slip relative to the tool, a friction law, or the coefficient of Coulomb's, None
+            for none.
         allowed_penetration: If given, the contact is augmented until the mean penetration of no facet that is pressed
             as a whole is larger [length].
-        allowed_slip: If given, the friction is augmented until no sticking facet slides more than this in a step
-            [length].
         search: Largest distance of a partner, on either side, beyond what has moved in the step [length]; by
             default the mean size of the facets.
         name: Name in messages and output.
@@ -127,9 +139,8 @@ class TriangulatedTool(RigidTool):
         path: ToolPath,
         *,
         contact: PenaltyContact,
-        friction: FrictionLaw | float | None = None,
+        friction: AnyFriction = None,
         allowed_penetration: float | None = None,
-        allowed_slip: float | None = None,
         search: float | None = None,
         name: str = "tool",
         machines: Sequence[Machine] = (),
@@ -137,12 +148,8 @@ class TriangulatedTool(RigidTool):
         check_friction("friction", friction)
         super().__init__(state, path, name, machines)
         gdim = state.mesh.geometry.dim
-        for key, length in {
-            "search": search,
-            "allowed_penetration": allowed_penetration,
-            "allowed_slip": allowed_slip,
-        }.items():
-            require_number(key, length, positive.or_none)
+        require_number("search", search, positive.or_none)
+        require_number("allowed_penetration", allowed_penetration, positive.or_none)
         require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
         face = Face.outer(state.mesh, facets)
         points = slave_points(state, face, "facets")
@@ -152,14 +159,18 @@ class TriangulatedTool(RigidTool):
         self._normal_size = points.mean(normal_size(state.mesh, points.facets))
         slave = SlaveSurface(state.V, face, points)
         kinematics = CurrentPartners(state.memory, name, slave, master, search=search or size, size=size)
-        law = completed(friction, contact.stiffness) if friction else None
-        laws = PairLaws(None, contact, law, allowed_penetration, allowed_slip)
-        self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0)
+        laws = PairLaws(None, contact, completed(friction, contact.stiffness), allowed_penetration)
+        self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0, tool=self.temperature)
         if self._guide is not None:
             nodes = locate_dofs(state.V, gdim - 1, facets)
             self._driven = DrivenAssembler(
                 state, name, self._guide, lambda: self.move(1.0), contact=self.touch, nodes=nodes, machines=machines
             )
+
+    @property
+    def touched(self) -> Sequence[_Touch]:
+        """The one surface of the body."""
+        return (self.touch,)
 
     @property
     def slips(self) -> Sequence[SlipHistory]:

@@ -13,7 +13,7 @@ from common import measure
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from cutsim import Coulomb, Mechanics, NeoHookean, Solid, State, StepControl, StepReport, Support, SurfacePair, run
+from cutsim import Friction, Mechanics, NeoHookean, Solid, State, StepControl, StepReport, Support, SurfacePair, run
 from cutsim.base.compat import create_mesh, geometry_nodes
 
 EDGE, PRESS, DRAW = 10.0, 1.0, 3.0
@@ -52,8 +52,8 @@ def main() -> None:
     domain = cubes(options.upper, options.lower)
     state = State(fem.functionspace(domain, ("Lagrange", 1, (3,))))
     surfaces = [faces(domain, EDGE, above) for above in (not options.below, options.below)]
-    allowed = {"allowed_penetration": options.penetration, "allowed_slip": options.penetration}
-    pair = SurfacePair(state, *surfaces, young=1.0, friction=Coulomb(0.3), **allowed)
+    friction = Friction(0.3, allowed_slip=options.penetration)
+    pair = SurfacePair(state, *surfaces, young=1.0, friction=friction, allowed_penetration=options.penetration)
     bottom, top = faces(domain, 0.0, True), faces(domain, 2 * EDGE, False)
     motion = (lambda t: DRAW * max(t - 1, 0.0), 0.0, lambda t: -PRESS * min(t, 1.0))
     supports = [Support(state, bottom, i, 0.0) for i in range(3)]

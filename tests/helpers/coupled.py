@@ -11,6 +11,7 @@ from cutsim import (
     Coulomb,
     Crack,
     Exponential,
+    Friction,
     HeatBody,
     HeatTransfer,
     InterfaceHeat,
@@ -77,7 +78,8 @@ def sliding(comm=MPI.COMM_WORLD):
         state, glued, (0.0, 0.0, -1.0), law, young=E, contact=contact, friction=Coulomb(0.3, 100.0),
         allowed_penetration=1e-4,
     )  # fmt: skip
-    pair = b.pair(law=GLUE, contact=contact, friction=Coulomb(0.2, 100.0), allowed_penetration=1e-4, allowed_slip=1e-3)
+    friction = Friction(Coulomb(0.2, 100.0), allowed_slip=1e-3)
+    pair = b.pair(law=GLUE, contact=contact, friction=friction, allowed_penetration=1e-4)
     path = ToolPath.polyline([0.0, 0.1, 2.0], [(0.4, 0.5, 2.0), (0.4, 0.5, 1.97), (0.9, 0.5, 1.97)])
     top = Surface.exterior(state, b.face(1, 2, 1))
     ball = ToolContact(state, Ball(1.0), path, [top], contact=contact, friction=Coulomb(0.3, 100.0), name="ball")
