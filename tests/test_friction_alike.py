@@ -146,7 +146,8 @@ def test_the_hotter_side_counts(kind, warm):
 def test_viscosity(kind):
     """t = μ p + η ds/dt."""
     rows = Sliding(kind, lambda T: Coulomb(MU, 1e6, viscosity=0.7)).run()
-    assert work(rows) == pytest.approx((MU * PRESSURE + 0.7 * WAY) * WAY, rel=2e-3)
+    power = np.diff(rows["energy_friction"])[-1] / 0.25
+    assert power == pytest.approx((MU * PRESSURE + 0.7 * WAY) * WAY, rel=1e-5)
 
 
 @pytest.mark.mpi
@@ -174,8 +175,11 @@ def test_what_sticks_does_so_within_the_tolerance(kind):
     for allowed in (None, 1e-5):
         s = Sliding(kind, lambda T, a=allowed: Friction(Coulomb(20.0, 2.0), allowed_slip=a), soft=True)
         s.run(0.5)
+        traction, limit = (s.slip.values(name) for name in ("traction", "limit"))
+        sticks = (np.linalg.norm(traction, axis=-1) < 0.99 * limit).all(axis=1)
+        assert sticks.any()
         components = np.moveaxis(s.slip.values("slid"), -1, 0)
-        slid[allowed] = np.linalg.norm([s.slip.points.facet_mean(c) for c in components], axis=0).max()
+        slid[allowed] = np.linalg.norm([s.slip.points.facet_mean(c) for c in components], axis=0)[sticks].max()
     assert slid[1e-5] <= 1e-5 < 1e-3 < slid[None]
 
 
