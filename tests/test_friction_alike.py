@@ -94,7 +94,7 @@ class Sliding:
             pair = b.pair(contact=CONTACT, friction=friction)
             return pair, PairHeat(T, pair, EXCHANGE)
         top, options = b.face(1, 1.0), {"contact": CONTACT, "friction": friction}
-        path = ToolPath(lambda t: moved(t) + [0.5, 1.0], corners=(1.0,))
+        path = ToolPath(lambda t: moved(t) + np.array([0.5, 1.0]), corners=(1.0,))
         if self.kind == "tool":
             tool = ToolContact(state, Plane((0.0, -1.0)), path, [Surface.exterior(state, top)], **options)
         else:
@@ -190,11 +190,12 @@ def test_beside_a_bond_a_pair_is_like_a_crack(acts_on):
     for kind in ("crack", "pair"):
         if kind == "crack":
             b = make_blocks()
-            parts, make = (b.lower, b.upper), b.crack
+            parts, make, options = (b.lower, b.upper), b.crack, {}
         else:
             b = two(2, n=(3, 4))
-            parts, make = (b.cells(0), b.cells(1)), lambda law, **o: b.pair(law=law, small_sliding=True, **o)
-        term = make(EXPONENTIAL, contact=CONTACT, friction=Friction(Coulomb(MU, 1e4), acts_on=acts_on))
+            parts, make, options = (b.cells(0), b.cells(1)), b.pair, {"small_sliding": True}
+        friction = Friction(Coulomb(MU, 1e4), acts_on=acts_on)
+        term = make(law=EXPONENTIAL, contact=CONTACT, friction=friction, **options)
         path = [lambda t: 0.35 * max(t - 1, 0.0), lambda t: -DEPTH * min(t, 1.0)]
         held = Sliding.rigid(b.state, parts[0], [0.0, 0.0]) + Sliding.rigid(b.state, parts[1], path)
         rows = history(Mechanics(b.state, [Solid(b.state, ELASTIC), term], held), 2.0, StepControl.fixed(0.1))

@@ -13,7 +13,7 @@ SOURCES, TESTS = Path(cutsim.__file__).parent, Path(__file__).parent
 #: Public constructors and functions whose keyword arguments are each of a kind of its own: bags of them would
 #: not help who calls. Each has the number that it may have, everything else at most 8.
 WIDE = {
-    "pairs.surface_pair.SurfacePair.__init__": 13,
+    "pairs.surface_pair.SurfacePair.__init__": 12,
     "results.pictures.draw_body": 15,
     "identify.inverse.fit_simulation": 11,
     "bodies.solid.Solid.__init__": 11,
@@ -25,8 +25,8 @@ WIDE = {
     "interface.crack.Crack.__init__": 11,
     "fields.laminate.laminate": 9,
     "studies.body.cracked_block": 9,
-    "tools.tool_contact.ToolContact.__init__": 11,
-    "tools.triangulated_tool.TriangulatedTool.__init__": 11,
+    "tools.tool_contact.ToolContact.__init__": 9,
+    "tools.triangulated_tool.TriangulatedTool.__init__": 10,
 }
 
 

@@ -18,9 +18,8 @@ from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
-from cutsim.interface.friction import FrictionLaw
 from cutsim.interface.guide import Guide
-from cutsim.interface.slip import check_friction
+from cutsim.interface.rubbing import AnyFriction, check_friction
 from cutsim.materials.elastic import Material
 from cutsim.results.recording import Columns
 
@@ -41,7 +40,7 @@ class Faces:
 
     Args:
         symmetric: Whether body and tool are alike on both sides of a plane crack.
-        friction: Friction law of the faces on each other, or the coefficient of Coulomb's; None for none. It acts
+        friction: Friction of the faces on each other, a law, or the coefficient of Coulomb's; None for none. It acts
             where the bond is broken.
 
     Raises:
@@ -49,7 +48,7 @@ class Faces:
     """
 
     symmetric: bool = False
-    friction: FrictionLaw | float | None = None
+    friction: AnyFriction = None
 
     def __post_init__(self) -> None:
         check_friction("friction", self.friction)

@@ -205,7 +205,7 @@ def _contacts(
                 motion.path(frame, half),
                 _surfaces(body, crack, face, group),
                 contact=half.firm_contact(crack.young, crack.normal_size) if indents else soft,
-                friction=completed(friction, soft.stiffness) if friction else None,
+                friction=completed(friction, soft.stiffness),
                 name=name,
             )
             if crack is not body.cracks[0]:  # how deep the cut will go is not known
