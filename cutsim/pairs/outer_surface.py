@@ -151,6 +151,11 @@ class SharedSurface:
         """Connected piece of the mesh to which each facet belongs. Collective."""
         return np.concatenate(self._comm.allgather(self._surface.pieces[self._surface.owned]))[self._order]
 
+    @property
+    def face(self) -> Face:
+        """The facets of this rank."""
+        return self._surface.face
+
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""
         return self.reference + self.gather(u)
