@@ -1,5 +1,7 @@
 """Scalar field at the points of a slave surface and where they meet the master (docs/theory.md §3.4, §3.5)."""
 
+from typing import Self
+
 import basix
 import numpy as np
 from dolfinx import fem
@@ -8,9 +10,10 @@ from cutsim.base.kinematics import Expr
 from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints
 from cutsim.fields.temperature import Temperature
-from cutsim.interface.rubbing import hotter
+from cutsim.interface.rubbing import Friction, hotter
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface
 from cutsim.pairs.pairing import Array, Hits, Indices
+from cutsim.pairs.partners import PairKinematics
 
 
 class PairedField:
@@ -80,6 +83,24 @@ class HotterSide:
         self._felt = points.function()
         felt = points.at(self._felt)
         self.value: Expr = felt if tool is None else hotter(felt, tool)
+
+    @classmethod
+    def of(
+        cls, friction: Friction | None, points: FacetPoints, kinematics: PairKinematics, tool: Expr | None
+    ) -> Self | None:
+        """What friction feels of a temperature, None if of none.
+
+        Args:
+            friction: The friction.
+            points: The points.
+            kinematics: What finds their partners.
+            tool: Temperature of a rigid tool.
+        """
+        if friction is None or friction.temperature is None:
+            return None
+        master = kinematics.master
+        met = master.face if isinstance(master, SharedSurface) else None
+        return cls(friction.temperature, points, kinematics.slave.face, met, tool)
 
     def feel(self, hits: Hits) -> None:
         """Bring the present temperature to the points, with these partners."""

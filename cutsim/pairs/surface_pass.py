@@ -16,7 +16,6 @@ from cutsim.interface.history import GAUSS, TRAPEZOID, InterfaceHistory
 from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.material_partners import MaterialPartners
 from cutsim.pairs.nodal_forces import Action, Coupling
-from cutsim.pairs.outer_surface import SharedSurface
 from cutsim.pairs.pair_forces import PairForces, add_pattern
 from cutsim.pairs.pair_law import PairLaw, PairLaws
 from cutsim.pairs.paired_field import HotterSide
@@ -81,21 +80,12 @@ class SurfacePass:
         self.weights = weight * own.ravel()
         rule = GAUSS if isinstance(self.kinematics, MaterialPartners) else TRAPEZOID
         self.history = InterfaceHistory(state.memory, name, points, laws.cohesive, rule, ("held",))
-        self._warmth = self._hotter_side(laws, tool)
+        self._warmth = HotterSide.of(laws.friction, points, self.kinematics, tool)
         felt = None if self._warmth is None else self._warmth.value
         self._law = PairLaw(state, name, points, laws, self.history, self._pairs_at(self._start()), felt)
         self.slip, self.viscous = self._law.slip, self._law.viscous
         self._seen: Array | None = None
         self._force = state.memory.value(f"{name}: force", np.zeros(self._dim))
-
-    def _hotter_side(self, laws: PairLaws, tool: Expr | None) -> HotterSide | None:
-        """What friction feels of a temperature."""
-        temperature = None if laws.friction is None else laws.friction.temperature
-        if temperature is None:
-            return None
-        slave, master = self.kinematics.slave.face, self.kinematics.master
-        met = master.face if isinstance(master, SharedSurface) else None
-        return HotterSide(temperature, self.points, slave, met, tool)
 
     @property
     def force(self) -> Array:

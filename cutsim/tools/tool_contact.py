@@ -73,7 +73,7 @@ class Patch:
         shape: Shape,
         pose: tuple[Expr, Expr],
         laws: ToolLaws,
-        temperature: fem.Constant,
+        temperature: Expr,
     ) -> None:
         self.surface, points = surface, surface.points
         position, self._rotation = pose
