@@ -24,6 +24,7 @@ from cutsim import (
     read_geo,
     run,
 )
+from cutsim.studies.body import Faces
 from cutsim.studies.insertion_heat import Conductor, ThermalCut, heated
 from helpers.fields import rotation
 
@@ -153,6 +154,17 @@ def test_any_degree_and_formulation():
     (_, plain), (cut, fine) = split(), split(degree=2, solid={"volumetric": "taylor-hood"})
     assert fine["force"][-1] == pytest.approx(plain["force"][-1], rel=0.05)
     assert "block_pressure" in cut.mechanics.fields and np.abs(fine["energy_closure"]).max() < 0.01
+
+
+def test_faces_that_slide_are_a_pair():
+    """The pair of both faces, of notch and bond, in place of the contact of the cracks: the same cut."""
+    (_, plain), (cut, sliding) = split(), split(faces=Faces(sliding=True))
+    np.testing.assert_allclose(sliding["force"][-1], plain["force"][-1], rtol=0.01)
+    assert [type(pair).__name__ for pair in cut.body.pairs] == ["SurfacePair"]
+    assert sliding["faces_pressed"].max() > 0 and sliding["faces_penetration"].max() < 0.1
+    assert np.abs(sliding["energy_closure"]).max() < 0.01
+    with pytest.raises(ValueError, match="sliding"):
+        Faces(sliding=True, symmetric=True)
 
 
 def test_a_body_without_a_notch_is_entered_at_its_surface():

@@ -82,8 +82,8 @@ def _cracked(domain: Domain) -> tuple[CrackedBody, Temperature | None]:
         faces = tables.insertion.faces
         cracks = (faces.crack(state, bonded, plus, tables.law, young=softest(bodies, bonded)),)
         cut = [faces.crack(state, f, plus, None, young=softest(bodies, f), name="notch") for f in broken]
-        guides = faces.guides(cracks)
-    return CrackedBody(domain.tagged, state, bodies, cracks, cut[0] if cut else None, guides=guides), value
+        guides, pairs, slit = faces.guides(cracks), faces.pairs([*cut, *cracks]), cut[0] if cut else None
+    return CrackedBody(domain.tagged, state, bodies, cracks, slit, guides=guides, pairs=pairs), value
 
 
 def _state(domain: Domain, split: Sequence[Entities]) -> State:

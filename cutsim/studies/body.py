@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,14 @@ from cutsim.interface.crack import Crack
 from cutsim.interface.guide import Guide
 from cutsim.interface.rubbing import AnyFriction, check_friction
 from cutsim.materials.elastic import Material
+from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.results.recording import Columns
 
 Facets = NDArray[np.int32]
 
 # contact of the faces of a crack under a tip that indents it: penalty over E/h, and blend over h
 _FIRM, _BLEND = 50.0, 0.02
+_SIDES: tuple[Literal["+", "-"], ...] = ("+", "-")
 
 
 @checked
@@ -36,22 +38,27 @@ class Faces:
 
     A tip that indents an intact surface presses the faces on each other before it parts them, and draws the mouth of
     the crack out along itself, up to a right angle. If both sides are alike, the faces part along the normal of the
-    plane, however they turn, and their middle is kept in it by a `Guide`; and their contact is firmer.
+    plane, however they turn, and their middle is kept in it by a `Guide`; and their contact is firmer.  Faces that a
+    rubbing tool draws along beside each other slide: a pair of surfaces carries their pressure.
 
     Args:
         symmetric: Whether body and tool are alike on both sides of a plane crack.
+        sliding: Whether the faces slide over each other by more than a facet, as at the rim of a notch into which a
+            tool with much friction is pushed. They then look for each other anew, at a higher cost.
         friction: Friction of the faces on each other, a law, or the coefficient of Coulomb's; None for none. It acts
             where the bond is broken.
 
     Raises:
-        ValueError: The coefficient is negative.
+        ValueError: The coefficient is negative, or faces that are alike on both sides are to slide.
     """
 
     symmetric: bool = False
+    sliding: bool = False
     friction: AnyFriction = None
 
     def __post_init__(self) -> None:
         check_friction("friction", self.friction)
+        require("sliding", self.sliding, not (self.sliding and self.symmetric), "False where both sides are alike")
 
     def crack(
         self,
@@ -64,7 +71,9 @@ class Faces:
         name: str = "crack",
     ) -> Crack:
         """A crack with such faces; arguments as for `Crack`. Collective."""
-        options: dict[str, Any] = {"young": young, "name": name, "friction": self.friction}
+        options: dict[str, Any] = {"young": young, "name": name, "closing": not self.sliding}
+        if not self.sliding:
+            options["friction"] = self.friction
         if self.symmetric:
             require("faces.symmetric", True, not state.axisymmetric, "False in a body of revolution")
             smallest = global_range(state.mesh.comm, normal_size(state.mesh, facets))[0]
@@ -75,6 +84,14 @@ class Faces:
     def guides(self, cracks: Sequence[Crack]) -> tuple[Guide, ...]:
         """What keeps the middle of some cracks in their plane."""
         return tuple(Guide(crack) for crack in cracks) if self.symmetric else ()
+
+    def pairs(self, cracks: Sequence[Crack]) -> tuple[SurfacePair, ...]:
+        """What lets the faces of cracks that follow each other slide, those of one side as one surface. Collective."""
+        if not self.sliding:
+            return ()
+        plus, minus = ([crack.face(side) for crack in cracks] for side in _SIDES)
+        young = min(crack.young for crack in cracks)
+        return (SurfacePair(cracks[0].state, plus, minus, young=young, friction=self.friction, name="faces"),)
 
 
 #: Faces of which nothing is known beforehand.
@@ -96,6 +113,7 @@ class CrackedBody:
             have '+' on the same side.
         notch: Faces that touch and do not stick, from the surface to the first crack; None without a notch.
         guides: What keeps the middle of the cracks in their plane, see `Faces`.
+        pairs: What carries the pressure of faces that slide over each other, see `Faces`.
     """
 
     domain: TaggedMesh
@@ -104,11 +122,13 @@ class CrackedBody:
     cracks: tuple[Crack, ...]
     notch: Crack | None
     guides: tuple[Guide, ...] = field(default=(), kw_only=True)
+    pairs: tuple[SurfacePair, ...] = field(default=(), kw_only=True)
 
     @property
     def terms(self) -> list[Term]:
-        """Solids, cracks and guides, for the mechanical problem."""
-        return [*self.solids, *self.cracks, *([] if self.notch is None else [self.notch]), *self.guides]
+        """Solids, cracks, guides and pairs, for the mechanical problem."""
+        notch = [] if self.notch is None else [self.notch]
+        return [*self.solids, *self.cracks, *notch, *self.guides, *self.pairs]
 
     @property
     def mouth(self) -> Facets:
@@ -165,13 +185,15 @@ def cracked_block(
     state = cracked_state(domain, [bonded] if broken is None else [bonded, broken], degree, axisymmetric)
     young = material.young
     cut = (faces.crack(state, bonded, plus, law, young=young),)
+    open_ = [] if broken is None else [faces.crack(state, broken, plus, None, young=young, name="notch")]
     return CrackedBody(
         domain,
         state,
         (Solid(state, material, name="block", viscosity=viscosity, **(solid or {})),),
         cut,
-        None if broken is None else faces.crack(state, broken, plus, None, young=young, name="notch"),
+        open_[0] if open_ else None,
         guides=faces.guides(cut),
+        pairs=faces.pairs([*open_, *cut]),
     )
 
 

@@ -128,8 +128,9 @@ class LayeredBlock(CrackedBody):
         )
         through = [layer for layer in layers if layer not in parts[0][1:] and all(layer not in p for p in parts[1:])]
         notch = [faces.crack(state, where, towards, None, young=_softest(through), name="notch") for where in broken]
-        guides = faces.guides(cracks)
-        return cls(domain, state, solids, cracks, notch[0] if notch else None, tuple(layers), guides=guides)
+        guides, pairs = faces.guides(cracks), faces.pairs([*notch, *cracks])
+        cut = notch[0] if notch else None
+        return cls(domain, state, solids, cracks, cut, tuple(layers), guides=guides, pairs=pairs)
 
     def layers_of(self, crack: Crack) -> list[Layer]:
         """The layers through which a part of the crack goes."""
