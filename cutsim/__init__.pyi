@@ -98,6 +98,8 @@ from .studies.layered import Layer as Layer
 from .studies.layered import LayeredBlock as LayeredBlock
 from .studies.mesh_rule import MeshRule as MeshRule
 from .studies.picture import draw_insertion as draw_insertion
+from .tools.needle_tips import BevelNeedle as BevelNeedle
+from .tools.needle_tips import HollowNeedle as HollowNeedle
 from .tools.pointed import Blade as Blade
 from .tools.pointed import Needle as Needle
 from .tools.shapes import Ball as Ball

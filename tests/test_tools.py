@@ -4,8 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 from cutsim.base.rotations import rotation_matrix
+from cutsim.tools.needle_tips import BevelNeedle, HollowNeedle
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Plane, ToolPath
 from helpers.examples import TOOLS
@@ -25,15 +27,15 @@ def arc(centre, radius, start, end, n=4000):
     return np.asarray(centre) + radius * np.stack([np.cos(t), np.sin(t)], axis=1)
 
 
-def right_outline():
+def right_outline(half=HALF):
     """Right half of the blade's outline, foremost point at the origin, cutting downwards."""
-    centre, joint = np.array([0, R]), np.array([SHANK - R, R + (SHANK - R) / np.tan(HALF)])
-    normal = R * np.array([np.cos(HALF), -np.sin(HALF)])
+    centre, joint = np.array([0, R]), np.array([SHANK - R, R + (SHANK - R) / np.tan(half)])
+    normal = R * np.array([np.cos(half), -np.sin(half)])
     return np.concatenate(
         [
-            arc(centre, R, -np.pi / 2, -HALF),
+            arc(centre, R, -np.pi / 2, -half),
             dense([centre + normal, joint + normal]),
-            arc(joint, R, -HALF, 0),
+            arc(joint, R, -half, 0),
             dense([joint + np.array([R, 0]), joint + np.array([R, 20])]),
         ]
     )
@@ -50,6 +52,18 @@ def blade_outlines():
     }
 
 
+def ground_outline():
+    """A blade that is ground on its right only."""
+    left = np.concatenate([arc((0, R), R, -np.pi / 2, -np.pi), dense([(-R, R), (-R, 20)])])
+    return np.concatenate([left[::-1], right_outline()])
+
+
+def tube_outline():
+    """Section of a tube with a rounded end; what is left of the axis is the other wall."""
+    wall = [arc((0.5, 0.2), 0.2, -np.pi, -np.pi / 2), dense([(0.5, 0), (0.8, 0)]), arc((0.8, 0.2), 0.2, -np.pi / 2, 0)]
+    return np.concatenate([dense([(0.3, 20), (0.3, 0.2)]), *wall, dense([(1.0, 0.2), (1.0, 20)])])
+
+
 def punch_outline():
     right = [dense([(0, 0), (0.5, 0)]), arc((0.5, 0.2), 0.2, -np.pi / 2, 0), dense([(0.7, 0.2), (0.7, 20)])]
     right = np.concatenate(right)
@@ -60,6 +74,13 @@ OUTLINES = {
     "blade": (BLADE, blade_outlines()[0], (0.0, 2.0)),
     "right half": (Blade(HALF, R, SHANK, side=1), blade_outlines()[1], (0.0, 2.0)),
     "left half": (Blade(HALF, R, SHANK, side=-1), blade_outlines()[-1], (0.0, 2.0)),
+    "ground on one side": (Blade(HALF, R, SHANK, back_angle=0.0), ground_outline(), (0.0, 2.0)),
+    "asymmetric": (
+        Blade(HALF, R, SHANK, back_angle=0.7),
+        np.concatenate([(right_outline(0.7) * [-1, 1])[::-1], right_outline()]),
+        (0.0, 2.0),
+    ),
+    "tube": (HollowNeedle(1.0, 0.3, 0.2), tube_outline(), (0.6, 2.0)),
     "needle": (Needle(HALF, R, SHANK), blade_outlines()[0], (0.0, 2.0)),
     "cylinder": (Ball(0.8), arc((0, 0), 0.8, 0, 2 * np.pi), (0.0, 0.0)),
     "punch": (FlatPunch(0.7, 0.2), punch_outline(), (0.0, 2.0)),
@@ -147,6 +168,47 @@ def test_shapes_in_three_dimensions(shape, exact):
     np.testing.assert_allclose(np.linalg.norm(gradient, axis=1), 1, atol=1e-12)
 
 
+def nearest_in(constraints, point, start):
+    """Distance of a point to a convex body, given by what is not negative in it."""
+    rules = [{"type": "ineq", "fun": rule} for rule in constraints]
+    size = lambda y: ((y - point) ** 2).sum()  # noqa: E731
+    found = minimize(size, start, constraints=rules, method="SLSQP", options={"ftol": 1e-13})
+    return np.sqrt(found.fun)
+
+
+def test_bevel_needle_is_an_oblique_cylinder_with_a_rounded_edge():
+    angle, radius, r = 0.45, 0.8, 0.12
+    core = radius - r
+    inside = [
+        lambda y: core**2 - y[0] ** 2 - y[1] ** 2,
+        lambda y: (y[2] - r) * np.sin(angle) - (y[0] + core) * np.cos(angle),
+    ]
+    rng = np.random.default_rng(4)
+    points = rng.uniform((-1, -1, -0.2), (1, 1, 4), (150, 3))
+    distance, gradient = values(BevelNeedle(angle, radius, r), points)
+    near = (distance > -0.9 * r) & (distance < 0.3)
+    brute = [nearest_in(inside, p, np.array([0.0, 0.0, 6.0])) - r for p in points[near]]
+    assert near.sum() > 20
+    np.testing.assert_allclose(distance[near], brute, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(gradient[near], axis=1), 1, atol=1e-8)
+
+
+def test_blade_with_ends_is_a_rounded_prism():
+    blade = Blade(HALF, R, SHANK, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), edge_length=1.4)
+    s, c = np.sin(HALF), np.cos(HALF)
+    inside = [
+        *(lambda y, side=side: (y[2] - R) * s - side * y[0] * c for side in (1, -1)),
+        *(lambda y, side=side: SHANK - R - side * y[0] for side in (1, -1)),
+        *(lambda y, side=side: 0.7 - R - side * y[1] for side in (1, -1)),
+    ]
+    points = np.random.default_rng(5).uniform((-1.2, -1.1, -0.2), (1.2, 1.1, 2.5), (60, 3))
+    distance = values(blade, points)[0]
+    near = (distance > -0.9 * R) & (distance < 0.3)
+    brute = [nearest_in(inside, p, np.array([0.0, 0.0, 3.0])) - R for p in points[near]]
+    assert near.sum() > 20
+    np.testing.assert_allclose(distance[near], brute, atol=1e-6)
+
+
 @pytest.mark.parametrize("kind", ["blade", "punch", "needle"])
 def test_three_dimensional_shape_is_the_plane_one_swept(kind):
     """A blade is the same all along its edge, punch and needle all round their axis; all in any orientation."""
@@ -199,6 +261,15 @@ def test_half_width_is_the_outline():
         (Blade, (0.2, 0.1, 1.0, (0, -1), (0, 1)), "lateral"),
         (Blade, (0.2, 0.1, 1.0, (0, 0), (0, 1)), "push"),
         (Blade, (0.2, 0.1, 1.0, (0, -1), (1, 0), 2), "side"),
+        (Blade, (0.2, 0.1, 1.0, (0, -1), (1, 0), 0, -0.1), "back_angle"),
+        (Blade, (0.2, 0.1, 1.0, (0, -1), (1, 0), 0, None, 3.0), "edge_length"),
+        (Blade, (0.2, 0.1, 1.0, (0, 0, -1), (1, 0, 0), 0, None, 0.2), "edge_length"),
+        (HollowNeedle, (0.5, 0.4, 0.05), "outer_radius"),
+        (HollowNeedle, (0.5, 0.0, 0.05), "inner_radius"),
+        (BevelNeedle, (0.2, 0.5, 0.05), "bevel_angle"),
+        (BevelNeedle, (0.5, 0.5, 0.2), "edge_radius"),
+        (BevelNeedle, (0.5, 0.5, 0.05, (0, -1)), "push"),
+        (BevelNeedle, (0.5, 0.5, 0.05, (0, 0, -1), (1, 0, 1)), "lateral"),
         (Ball, (0.0,), "radius"),
         (Ball, (1.0, (0, 0, 0)), "axis"),
         (FlatPunch, (0.1, 0.1), "radius"),

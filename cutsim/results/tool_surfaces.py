@@ -177,10 +177,11 @@ def _pointed(shape: Pointed, pose: Pose, box: Array) -> Any:
         return pose.placed(revolved(outline, np.zeros(3), ((shape.side or 1) * lateral, -push), turn=turn))
     if shape.side:
         outline = outline[shape.side * outline[:, 0] >= 0]
-    beside = 0.0 if flat else _BESIDE * (high - low)
-    length = None if flat else (high - low + 2 * beside) * edge
-    start = np.zeros(3) if flat else (low - beside) * edge
-    return pose.placed(prism(outline, start, (lateral, -push), length))
+    if flat:
+        return pose.placed(prism(outline, np.zeros(3), (lateral, -push)))
+    beside, given = _BESIDE * (high - low), getattr(shape, "edge_length", None)
+    ends = (low - beside, high + beside) if given is None else (-0.5 * given, 0.5 * given)
+    return pose.placed(prism(outline, ends[0] * edge, (lateral, -push), (ends[1] - ends[0]) * edge))
 
 
 class _Level:

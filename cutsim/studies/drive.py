@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cutsim.base.checks import above, at_least, between, positive, require, require_number
+from cutsim.base.checks import above, at_least, between, nonnegative, positive, require, require_number
 from cutsim.base.signatures import checked
-from cutsim.base.units import Length, Time, Velocity
+from cutsim.base.units import Length, Number, Time, Velocity
 from cutsim.studies.frame import Frame
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.shapes import ToolPath
@@ -28,6 +28,8 @@ class Drive:
             default it is that in which the push would come as far.
         turning_depth: Depth of the tip at which the tool turns back to where the push began, to be pushed once more
             [length]; None if it goes on.
+        slice_push: Slice–push ratio ξ ≥ 0: speed of a blade along its edge over the speed of the push, from the
+            beginning of the push on, in space [–].
 
     Raises:
         ValueError: A number is outside its range.
@@ -36,11 +38,13 @@ class Drive:
     speed: Velocity
     entry_time: Time | None = None
     turning_depth: Length | None = None
+    slice_push: Number = 0.0
 
     def __post_init__(self) -> None:
         require_number("speed", self.speed, positive)
         require_number("entry_time", self.entry_time, positive.or_none)
         require_number("turning_depth", self.turning_depth, positive.or_none)
+        require_number("slice_push", self.slice_push, nonnegative)
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ class Motion:
         turning_depth: Depth at which the tool turns back, None if it does not [length].
         reach: Depth that the tip has to stay above: that of the body's far side, or infinity if the body is held at
             its ends and may fall in two [length].
+        slice_speed: Speed along the edge, from the beginning of the push on [length/time].
     """
 
     speed: float
@@ -66,6 +71,7 @@ class Motion:
     entry_time: float
     turning_depth: float | None
     reach: float
+    slice_speed: float = 0.0
 
     @classmethod
     def of(cls, drive: Drive, tool: Pointed, notch: float, reach: float) -> "Motion":
@@ -79,8 +85,9 @@ class Motion:
         if drive.turning_depth is not None:
             require_number("turning_depth", drive.turning_depth, above(start_depth, "the start of the push"))
             require_number("turning_depth", drive.turning_depth, between(0, reach, name="the height of the body"))
-        entry_time = drive.entry_time or start_height / drive.speed
-        return cls(drive.speed, start_height, start_depth, entry_time, drive.turning_depth, reach)
+        entry_time, slice_speed = drive.entry_time or start_height / drive.speed, drive.slice_push * drive.speed
+        require("drive.slice_push", drive.slice_push, not slice_speed or len(tool.push) == 3, "0 in the plane")
+        return cls(drive.speed, start_height, start_depth, entry_time, drive.turning_depth, reach, slice_speed)
 
     @property
     def pushes(self) -> int:
@@ -119,9 +126,17 @@ class Motion:
 
     def path(self, frame: Frame, tool: Pointed) -> ToolPath:
         """ToolPath of a tool, or of a half of it, in a frame."""
-        return ToolPath(
-            self._spread(frame, tool) if tool.side and self.start_depth else self._lower(frame), self.corners
-        )
+        spread = tool.side and self.start_depth
+        return ToolPath(self._sliced(frame, self._spread(frame, tool) if spread else self._lower(frame)), self.corners)
+
+    def _sliced(
+        self, frame: Frame, push: Callable[[float], NDArray[np.float64]]
+    ) -> Callable[[float], NDArray[np.float64]]:
+        """A push, with the slice along the edge."""
+        edge = frame.edge
+        if edge is None or not self.slice_speed:
+            return push
+        return lambda time: push(time) + self.slice_speed * max(time - self.entry_time, 0.0) * edge
 
     def _lower(self, frame: Frame) -> Callable[[float], NDArray[np.float64]]:
         return lambda time: frame.point(self.depth(time))

@@ -10,7 +10,7 @@ import ufl
 from numpy.typing import NDArray
 
 from cutsim.base.checks import above, between, positive, require, require_number
-from cutsim.base.functions import positive_part
+from cutsim.base.functions import larger, positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.units import Angle, Length
@@ -21,25 +21,27 @@ from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit_vector
 _FIRM, _BLEND = 1000.0, 0.1
 
 
-def _pointed(across: Expr, above: Expr, half_angle: float, width: float, radius: float) -> Expr:
-    """Distance to a pointed body with a rounded tip and joint, in the plane of its axis.
+def _pointed(across: Expr, above: Expr, half_angle: float, width: float, scale: float) -> Expr:
+    """Distance to a sharp pointed body, a convex polygon, in the plane of its axis.
 
     Args:
         across: Distance from the axis, or < 0 where the body goes on without end.
-        above: Height above the tip of the core, in the body.
-        half_angle: Angle between axis and flank.
-        width: Half width of the shank of the core, a convex polygon.
-        radius: Radius of tip and joint, by which the body is larger than its core.
+        above: Height above the tip, in the body.
+        half_angle: Angle between axis and flank; 0 for a flank that is the shank itself.
+        width: Half width of the shank.
+        scale: A length, to which others are not small.
     """
-    height = width / tan(half_angle)
     s, c = sin(half_angle), cos(half_angle)
     slope = across * s + above * c
-    length = (width**2 + height**2) ** 0.5
-    tip = ufl.conditional(ufl.lt(across, 0), -above, hypot(across, above, radius))
+    tip = ufl.conditional(ufl.lt(across, 0), -above, hypot(across, above, scale))
     flank = across * c - above * s
-    joint = hypot(across - width, above - height, radius)
-    shank = ufl.conditional(ufl.gt(above, height), across - width, joint)
-    return ufl.conditional(ufl.lt(slope, 0), tip, ufl.conditional(ufl.lt(slope, length), flank, shank)) - radius
+    if half_angle > 0:
+        height = width / tan(half_angle)
+        length = (width**2 + height**2) ** 0.5
+        joint = hypot(across - width, above - height, scale)
+        shank = ufl.conditional(ufl.gt(above, height), across - width, joint)
+        flank = ufl.conditional(ufl.lt(slope, length), flank, shank)
+    return ufl.conditional(ufl.lt(slope, 0), tip, flank)
 
 
 class Pointed(ABC):
@@ -99,14 +101,28 @@ class Pointed(ABC):
         """
         return PenaltyContact.automatic(young, h, _FIRM, blend=_BLEND * h)
 
+    def flank_angle(self, side: int) -> float:
+        """Angle between axis and flank on the side of ±lateral [rad]."""
+        return self.half_angle
+
     @property
     def shaft_height(self) -> float:
         """Height above the foremost point at which the shank begins [length]."""
-        return (self.width - self.tip_radius) / tan(self.half_angle) + self.tip_radius
+        sides = (self.side,) if self.side else (1, -1)
+        return max(self._shaft_height(self.flank_angle(side)) for side in sides)
 
-    def half_width(self, height: float) -> float:
-        """Distance from the axis to the flank or shank, a height above the tip [length]."""
-        flank = ((height - self.tip_radius) * sin(self.half_angle) + self.tip_radius) / cos(self.half_angle)
+    def _shaft_height(self, angle: float) -> float:
+        return (self.width - self.tip_radius) / tan(angle) + self.tip_radius if angle > 0 else self.tip_radius
+
+    def half_width(self, height: float, side: int | None = None) -> float:
+        """Distance from the axis to the flank or shank, a height above the tip [length].
+
+        Args:
+            height: The height [length].
+            side: On the side of ±lateral; by default that of the tool, and + of a whole one.
+        """
+        angle = self.flank_angle(side or self.side or 1)
+        flank = ((height - self.tip_radius) * sin(angle) + self.tip_radius) / cos(angle)
         return min(flank, self.width)
 
     def outline(self, height: float, points: int = 12) -> NDArray[np.float64]:
@@ -119,21 +135,30 @@ class Pointed(ABC):
         Returns:
             Closed polygon without repeated point, rows (lateral, above the tip) [length].
         """
-        turn = np.linspace(0, pi / 2 - self.half_angle, points)
+        right, left = (self._outline(side, height, points) for side in (1, -1))
+        return np.vstack([right, (left * (-1, 1))[:0:-1]])
+
+    def _outline(self, side: int, height: float, points: int) -> NDArray[np.float64]:
+        """The part on one side, from the tip upwards."""
+        angle = self.flank_angle(side)
+        turn = np.linspace(0, pi / 2 - angle, points)
         arc = self.tip_radius * np.column_stack([np.sin(turn), 1 - np.cos(turn)])
-        rest = [(self.half_width(h), h) for h in sorted({min(self.shaft_height, height), height})]
-        right = np.vstack([arc, rest])
-        return np.vstack([right, (right * (-1, 1))[:0:-1]])
+        heights = sorted({min(self._shaft_height(angle), height), height})
+        return np.vstack([arc, [(self.half_width(h, side), h) for h in heights]])
 
     def distance(self, x: Expr) -> Expr:
         """Distance to the sharp core minus the tip radius [length]."""
         above = -along(x, self.push) - self.tip_radius  # from the core's tip into the tool
-        width = self.width - self.tip_radius
-        return _pointed(self._across(x), above, self.half_angle, width, self.tip_radius)
+        return self._core(x, above) - self.tip_radius
 
     @abstractmethod
-    def _across(self, x: Expr) -> Expr:
-        """Distance from the axis, < 0 where a half goes on without end."""
+    def _core(self, x: Expr, above: Expr) -> Expr:
+        """Distance to the core, at a height above its tip."""
+
+    def _section(self, across: Expr, above: Expr, side: int) -> Expr:
+        """Distance to the core in the plane of the axis, across on the side of ±lateral."""
+        width = self.width - self.tip_radius
+        return _pointed(across, above, self.flank_angle(side), width, self.tip_radius)
 
     def _check(self, width: str) -> None:
         """Refuse values outside their range; directions become unit vectors."""
@@ -154,7 +179,10 @@ class Pointed(ABC):
 @checked
 @dataclass(frozen=True)
 class Blade(Pointed):
-    """Wedge blade with a rounded tip, flanks at the half angle and a parallel shank; its edge has no ends.
+    """Wedge blade with a rounded tip, flanks at the half angle and a parallel shank.
+
+    The edge is straight and has no ends, or in space two rounded ones.  The flanks may differ, as those of a blade that
+    is ground on one side.
 
     With `side` = ±1 it is the *convex half blade* that one crack face meets: the half on the side of ±lateral,
     continued without end to the other side, so that no face is ever pushed to the wrong side.
@@ -166,6 +194,10 @@ class Blade(Pointed):
         push: Direction in which the blade cuts; the reference point is the foremost point of the tip.
         lateral: Direction normal to the plane of symmetry.
         side: 0 for the whole blade, +1 or −1 for the half on the side of ±lateral.
+        back_angle: Angle of the flank on the side of −lateral [rad], in [0, π/2); 0 for a blade that is ground on one
+            side, by default the half angle.
+        edge_length: Length of the edge, in space, of which the reference point is the middle; > 2 r [length]. None for
+            an edge without ends.
 
     Raises:
         ValueError: A value is outside its range, or push and lateral are not orthogonal.
@@ -180,18 +212,40 @@ class Blade(Pointed):
     push: Direction = (0.0, -1.0)
     lateral: Direction = (1.0, 0.0)
     side: int = 0
+    back_angle: Angle | None = None
+    edge_length: Length | None = None
 
     def __post_init__(self) -> None:
         self._check("half_thickness")
+        require_number("back_angle", self.back_angle, between(0, pi / 2, "[)", name="π/2 rad").or_none)
+        require_number("edge_length", self.edge_length, above(2 * self.tip_radius, "2 tip_radius").or_none)
+        spatial = self.edge_length is None or len(self.push) == 3
+        require("edge_length", self.edge_length, spatial, "None in the plane")
 
     @property
     def width(self) -> float:
         """Half the thickness of the shank [length]."""
         return self.half_thickness
 
-    def _across(self, x: Expr) -> Expr:
+    def flank_angle(self, side: int) -> float:
+        """Angle between axis and flank on the side of ±lateral [rad]."""
+        return self.half_angle if side > 0 or self.back_angle is None else self.back_angle
+
+    def _core(self, x: Expr, above: Expr) -> Expr:
         across = along(x, self.lateral)
-        return abs(across) if self.side == 0 else self.side * across
+        if self.side:
+            section = self._section(self.side * across, above, self.side)
+        elif self.flank_angle(1) == self.flank_angle(-1):
+            section = self._section(abs(across), above, 1)
+        else:  # the larger one of both halves, each without end on the other side
+            section = larger(*(self._section(side * across, above, side) for side in (1, -1)))
+        if self.edge_length is None:
+            return section
+        edge = ufl.cross(ufl.as_vector(self.push), ufl.as_vector(self.lateral))
+        beyond = abs(along(x, edge)) - (0.5 * self.edge_length - self.tip_radius)
+        outside = hypot(positive_part(section), positive_part(beyond), self.tip_radius)
+        deep = larger(section, beyond)
+        return ufl.conditional(ufl.lt(deep, 0), deep, outside)
 
 
 @checked
@@ -232,7 +286,11 @@ class Needle(Pointed):
         """Radius of the shaft [length]."""
         return self.radius
 
+    def _core(self, x: Expr, above: Expr) -> Expr:
+        return self._section(self._across(x), above, 1)
+
     def _across(self, x: Expr) -> Expr:
+        """Distance from the axis, 0 where a half goes on without end."""
         if self.lateral is None or self.side == 0:
             return from_axis(x, self.push, self.tip_radius)
         lateral = along(x, self.lateral)

@@ -103,6 +103,14 @@ def from_axis(x: Expr, push: Direction, scale: float) -> Expr:
     return ufl.sqrt(ufl.dot(radial, radial) + (1e-8 * scale) ** 2)
 
 
+def flat_ended(across: Expr, below: Expr, scale: float) -> Expr:
+    """Distance to a body with a flat end, from the distances across its side and below its end."""
+    corner = hypot(across, below, scale)
+    side = ufl.conditional(ufl.lt(below, 0), across, corner)
+    face = ufl.conditional(ufl.lt(across, 0), below, corner)
+    return ufl.conditional(ufl.gt(across, below), side, face)
+
+
 @checked
 @dataclass(frozen=True)
 class Ball:
@@ -170,12 +178,7 @@ class FlatPunch:
     def distance(self, x: Expr) -> Expr:
         """Distance to the core, a flat disc with a straight shank, minus the edge radius [length]."""
         r = self.edge_radius
-        across = from_axis(x, self.push, r) - (self.radius - r)
-        below = along(x, self.push) + r
-        corner = hypot(across, below, r)
-        side = ufl.conditional(ufl.lt(below, 0), across, corner)
-        face = ufl.conditional(ufl.lt(across, 0), below, corner)
-        return ufl.conditional(ufl.gt(across, below), side, face) - r
+        return flat_ended(from_axis(x, self.push, r) - (self.radius - r), along(x, self.push) + r, r) - r
 
 
 @checked

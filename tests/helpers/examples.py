@@ -15,6 +15,7 @@ from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
 from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
+from cutsim.tools.needle_tips import BevelNeedle, HollowNeedle
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Plane
 from helpers.laws import BILINEAR, EXPONENTIAL, NU, POLYNOMIAL, PPR, PROPORTIONAL, TRAPEZOIDAL, E
@@ -60,14 +61,21 @@ LAWS = {
 TOOLS = {
     "blade": (Blade(0.4, 0.3, 0.6), (0.4, 0.9)),
     "half blade": (Blade(0.4, 0.3, 0.6, side=1), (0.4, 0.9)),
+    "blade ground on one side": (Blade(0.5, 0.25, 0.6, back_angle=0.0), (0.4, 0.9)),
     "cylinder": (Ball(0.8), (0.3, 1.7)),
     "punch": (FlatPunch(0.7, 0.2), (0.15, 0.9)),
     "plane": (Plane((0.1, -1.0)), (0.5, 0.97)),
     "blade in 3-D": (Blade(0.4, 0.3, 0.6, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)), (0.4, 0.5, 0.9)),
+    "blade with ends": (
+        Blade(0.4, 0.2, 0.6, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), back_angle=0.5, edge_length=0.8),
+        (0.4, 0.5, 0.9),
+    ),
     "sphere": (Ball(0.8), (0.3, 0.4, 1.7)),
     "cylinder in 3-D": (Ball(0.8, (1.0, 0.2, 0.1)), (0.3, 0.4, 1.7)),
     "punch in 3-D": (FlatPunch(0.5, 0.2, (0.0, 0.0, -1.0)), (0.1, 0.2, 0.93)),
     "needle in 3-D": (Needle(0.4, 0.2, 0.5, (0.0, 0.0, -1.0)), (0.4, 0.45, 0.9)),
+    "hollow needle in 3-D": (HollowNeedle(0.45, 0.1, 0.1, (0.0, 0.0, -1.0)), (0.3, 0.4, 0.95)),
+    "bevel needle": (BevelNeedle(0.9, 0.5, 0.1), (0.85, 0.45, 0.85)),
     "plane in 3-D": (Plane((0.1, 0.1, -1.0)), (0.5, 0.5, 0.97)),
 }
 

@@ -8,6 +8,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import SmoothCoulomb
 from cutsim.tools.shapes import ToolPath
 from cutsim.tools.tool_contact import ToolContact
+from helpers.numeric import Numeric
 
 
 def values(shape, points):
@@ -15,13 +16,8 @@ def values(shape, points):
     n = len(points[0])
     cell = {2: "triangle", 3: "tetrahedron"}[n]
     x = ufl.variable(ufl.SpatialCoordinate(ufl.Mesh(basix.ufl.element("Lagrange", cell, 1, shape=(n,)))))
-    distance = shape.distance(x)
-    gradient = ufl.algorithms.expand_derivatives(ufl.diff(distance, x))
-    distance = ufl.algorithms.expand_derivatives(distance)
-    return (
-        np.array([distance(tuple(p)) for p in points]),
-        np.array([[gradient(tuple(p), component=(i,)) for i in range(n)] for p in points]),
-    )
+    distance, at = shape.distance(x), Numeric(points)
+    return at(distance), at(ufl.diff(distance, x))
 
 
 CONTACT = PenaltyContact(40.0, blend=0.02)
