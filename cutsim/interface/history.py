@@ -115,6 +115,11 @@ class InterfaceHistory:
         require("name", name, name in self.trial, f"one of {names}")
         return self.trial[name]
 
+    @property
+    def jump(self) -> Values | None:
+        """Opening and slide at the start of the step, see `Along`; None before the first one [length]."""
+        return self._known.committed.values.get("jump")
+
     def evaluate(self, along: Along) -> None:
         """Trial values, losses and the work of contact over the step. Collective."""
         at = {s: along(s) for s in sorted({0.0, 1.0, *self._rule.places})}

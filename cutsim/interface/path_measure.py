@@ -8,18 +8,32 @@ from dolfinx import fem
 from cutsim.base.assembly import Array, integrate, nodal_forces
 from cutsim.base.compat import form
 from cutsim.base.functions import positive_part
+from cutsim.base.kinematics import Expr
 from cutsim.fields.points import FacetPoints
 from cutsim.fields.state import State
 from cutsim.interface.crack_faces import CrackFaces
 from cutsim.interface.history import InterfaceHistory
 
 
-class PathMeasure:
-    """Loss ½ Σ (K_i,old − K_i) δ_i,old δ_i over the modes, integrated over a crack.
+def step_loss(memory: Expr, secants: tuple[Expr, Expr], before: tuple[Expr, Expr], now: tuple[Expr, Expr]) -> Expr:
+    """Loss ½ Σ (K_i,old − K_i) δ_i,old δ_i over the modes at a point [energy per reference area].
 
     With the smallest secants K this is the exact dissipation of a step along a straight softening branch.  Elsewhere it
     is exact to first order in the step, which is all that a path parameter needs: the audit goes by
     `cutsim.interface.dissipation`.
+
+    Args:
+        memory: Smallest secants at the start of the step ...
+        secants: ... and at its end.
+        before: Opening, of either sign, and sliding ≥ 0 at the start ...
+        now: ... and at the end.
+    """
+    opened = positive_part(before[0]) * positive_part(now[0])
+    return 0.5 * ((memory[0] - secants[0]) * opened + (memory[1] - secants[1]) * before[1] * now[1])
+
+
+class PathMeasure:
+    """What the bond of a crack loses in a step, by `step_loss`.
 
     Args:
         state: Displacement and time.
@@ -36,10 +50,8 @@ class PathMeasure:
         """Loss and derivative: compiled when a path is followed for the first time, which most runs never do."""
         state, points = self._state, self._points
         before, now = self._faces.response(state.u_old), self._faces.response(state.u)
-        memory = points.at(self._history.secants)
-        softened = [memory[i] - now.secants[i] for i in (0, 1)]
-        opened = positive_part(before.opening) * positive_part(now.opening)
-        loss = 0.5 * (softened[0] * opened + softened[1] * before.sliding * now.sliding) * points.measure
+        jumps = ((r.opening, r.sliding) for r in (before, now))
+        loss = step_loss(points.at(self._history.secants), now.secants, *jumps) * points.measure
         slope = ufl.derivative(loss, state.u, ufl.TestFunction(state.V))
         return form(loss, entity_maps=points.entity_maps), form(slope, entity_maps=points.entity_maps)
 

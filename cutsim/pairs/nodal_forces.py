@@ -104,6 +104,17 @@ class Action:
 
 
 @dataclass(frozen=True)
+class Slope(Action):
+    """Derivative of what is summed over the points, by its derivatives by the jump in place of tractions."""
+
+    def forces(self, rows: Indices) -> Array:
+        """Derivatives by the nodes of some pairs, shape (rows, nodes, dimension)."""
+        points = self.pairs.hits.points[rows]
+        by_jump = self.weights[points, None] * self.values[points]
+        return np.asarray(np.einsum("nb,nbcj->ncj", by_jump, self.of_jump(rows)))
+
+
+@dataclass(frozen=True)
 class Coupling:
     """Share of the tractions of a contact that depends on the jump of a bond with other partners.
 

@@ -1,20 +1,22 @@
 """Interface law at points whose jump is not computed by a form (docs/theory.md §3, 3.5)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import ufl
 
 from cutsim.base.functions import larger
-from cutsim.base.kinematics import Expr
+from cutsim.base.kinematics import Expr, safe_norm
 from cutsim.base.parameters import with_constants
 from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.history import InterfaceHistory
-from cutsim.interface.modified_contact import respond
+from cutsim.interface.modified_contact import InterfaceResponse, respond
+from cutsim.interface.path_measure import step_loss
 from cutsim.interface.rubbing import Friction, Rubbing
 from cutsim.interface.slip import SlipHistory
 from cutsim.interface.viscous import ViscousBond, ViscousHistory
@@ -114,6 +116,8 @@ class PairLaw:
         # the traction of a bond does not depend on other partners
         blocks = {(i, j): ufl.diff(tractions[i], jumps[j]) for i in range(self._kinds) for j in range(i, self._kinds)}
         traction = {str(i): t for i, t in enumerate(tractions)}
+        self._before = points.function(self._dim)
+        self._lost = self._step_loss(bond, jumps[-1])
         self._values = points.evaluator(columns)
         self._traction = points.evaluator(traction)
         self._linear = points.evaluator(traction | {f"{i}{j}": _flat(block) for (i, j), block in blocks.items()})
@@ -134,6 +138,24 @@ class PairLaw:
     def values(self) -> dict[str, Values]:
         """Values of the law for the present jump: what `InterfaceHistory` wants but the power, and "held"."""
         return self._values()
+
+    def _step_loss(self, bond: InterfaceResponse, jump: Expr) -> dict[str, Expr]:
+        """What the bond loses in the step, and the derivative by its jump."""
+        before, memory = self._points.at(self._before), self._points.at(self._history.secants)
+        slid = safe_norm(ufl.as_vector([before[i] for i in range(1, self._dim)]), 0.0)
+        loss = step_loss(memory, bond.secants, (before[0], slid), (jump[0], bond.sliding))
+        return {"loss": loss, "slope": ufl.diff(loss, jump)}
+
+    @cached_property
+    def _loss(self) -> Callable[[], dict[str, Values]]:
+        return self._points.evaluator(self._lost)
+
+    def loss(self) -> tuple[Values, Array]:
+        """What the bond loses in the step, and the derivative by its jump, shape (points, dimension)."""
+        start = self._history.jump
+        self._points.set(self._before, np.zeros((*self._points.weights.shape, self._dim)) if start is None else start)
+        values = self._loss()
+        return values["loss"], values["slope"].reshape(-1, self._dim)
 
     def linear(self) -> tuple[list[Array], list[Array], Array | None]:
         """Tractions, their derivatives by the jump, and those of the contact by the jump of the bond.

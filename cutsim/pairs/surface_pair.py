@@ -189,6 +189,11 @@ class SurfacePair(Term):
         forces = [f for p in self.passes if (f := p.rate_forces()) is not None]
         return np.sum(forces, axis=0) if forces else None
 
+    def path_measure(self) -> tuple[float, NDArray[np.float64]]:
+        """What the bond loses in the step, see `cutsim.base.terms.Dissipating`. Collective."""
+        losses, slopes = zip(*(p.path_measure() for p in self.passes), strict=True)
+        return sum(losses), np.sum(slopes, axis=0)
+
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step; 0 without a law. Collective."""
         return 0.0 if self.law is None else max(p.history.damage_increment() for p in self.passes)

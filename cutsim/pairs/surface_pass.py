@@ -15,7 +15,7 @@ from cutsim.fields.state import State
 from cutsim.interface.history import GAUSS, TRAPEZOID, InterfaceHistory
 from cutsim.pairs.configuration import Pairs
 from cutsim.pairs.material_partners import MaterialPartners
-from cutsim.pairs.nodal_forces import Action, Coupling
+from cutsim.pairs.nodal_forces import Action, Coupling, Slope
 from cutsim.pairs.pair_forces import PairForces, add_pattern
 from cutsim.pairs.pair_law import PairLaw, PairLaws
 from cutsim.pairs.paired_field import HotterSide
@@ -212,11 +212,19 @@ class SurfacePass:
         """Nodal forces of the viscosity of the bond, owned entries; None without it."""
         if self.viscous is None:
             return None
-        pairs, values = self._now()[-1], self.viscous.values().reshape(-1, self._dim)
-        none = np.zeros((*values.shape, self._dim))
-        dofmap = self._state.V.dofmap
+        return self._owned(Action, self.viscous.values().reshape(-1, self._dim))
+
+    def path_measure(self) -> tuple[float, Array]:
+        """What the bond loses in the step, and the derivative, see `cutsim.base.terms.Dissipating`."""
+        self._now()
+        loss, slope = self._law.loss()
+        return self.weight * self.points.integral(loss), self._owned(Slope, slope)
+
+    def _owned(self, kind: type[Action], values: Array) -> Array:
+        """Owned nodal values of what acts between the points and their last partners."""
+        dofmap, none = self._state.V.dofmap, np.zeros((*values.shape, self._dim))
         b = owned_vector(dofmap.index_map, dofmap.index_map_bs)
-        PairForces([Action(self._all[-1], pairs, self.weights, values, none)]).add(b)
+        PairForces([kind(self._all[-1], self._now()[-1], self.weights, values, none)]).add(b)
         b.assemble()
         forces = b.array.copy()
         b.destroy()

@@ -210,11 +210,11 @@ def mixed(lever: float, comm: MPI.Comm = COMM, *, cells: int = 112) -> Body:
 
     loads = [load("end", end, lever / HALF), load("middle", middle, -(1 + lever / HALF))]
     pins = [pin(end, 1), pin(far, 0), pin(far, 1)]
-    step = REEDER[lever][0] / 100 / 8
+    step = REEDER[lever][0] / 100 / 9.3
     return Body(
         Mechanics(state, [Solid(state, PLIES), bond, faces, *loads], pins),
         bond,
-        control(step, step),
+        control(step, step, facets=0.5),
         lambda report: 100 * report.time,
         lambda report: crack_front(bond) > HALF + 15,
     )
