@@ -210,9 +210,7 @@ class SurfacePass:
 
     def rate_forces(self) -> Array | None:
         """Nodal forces of the viscosity of the bond, owned entries; None without it."""
-        if self.viscous is None:
-            return None
-        return self._owned(Action, self.viscous.values().reshape(-1, self._dim))
+        return None if self.viscous is None else self._owned(Action, self.viscous.values().reshape(-1, self._dim))
 
     def path_measure(self) -> tuple[float, Array]:
         """What the bond loses in the step, and the derivative, see `cutsim.base.terms.Dissipating`."""
