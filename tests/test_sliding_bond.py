@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl
+from cutsim.analysis.stepping import StepControl, run
 from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.cases import read_case
@@ -16,6 +16,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import LinearElastic, NeoHookean
 from cutsim.pairs.surface_pair import SurfacePair
+from cutsim.results.recording import Recording
 from cutsim.solvers.convergence import Tolerances
 from helpers.blocks import make_blocks, separated
 from helpers.boxes import stack, two
@@ -166,6 +167,22 @@ def test_a_law_that_bonds_nothing_is_refused():
     apart = stack(((0.0, 0.0), (1.0, 1.0), (2, 2)), ((0.0, 1.1), (1.0, 2.0), (2, 2)))
     with pytest.raises(ValueError, match=r"search = 0\.01 .*as large as the gap that the law bonds"):
         apart.pair(law=EXPONENTIAL, search=0.01)
+
+
+@pytest.mark.mpi
+def test_a_bond_shows_its_damage(folder):
+    """In the fields of a run, on the facets of the slave."""
+    b = two(2, n=(4, 5))
+    pair = b.pair(law=EXPONENTIAL)
+    rigid = [Support(b.state, b.cells(box), 0, part, dim=2) for box, part in ((0, 0.0), (1, lambda t: 0.3 * t))]
+    rigid += [Support(b.state, b.cells(box), 1, 0.0, dim=2) for box in (0, 1)]
+    mechanics = Mechanics(b.state, [Solid(b.state, LinearElastic(E, 0.3)), pair], rigid)
+    with Recording(folder, mechanics, 1.0, every=1) as recording:
+        run(mechanics, 1.0, StepControl.fixed(0.5), recording)
+    bond = pair.companions[0]
+    broken = 1 - np.exp(1 - (0.3 / EXPONENTIAL.shear_opening) ** 2)
+    np.testing.assert_allclose(bond.facet_mean("damage"), broken, rtol=1e-9)
+    assert (folder / "pair_bond.bp").exists()
 
 
 # -- curved surfaces --------------------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.rubbing import AnyFriction, check_friction, completed
+from cutsim.pairs.bond_fields import BondFields
 from cutsim.pairs.material_partners import MaterialPartners
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface, SlaveSurface
 from cutsim.pairs.pair_law import PairLaws
@@ -150,6 +151,13 @@ class SurfacePair(Term):
     def residual(self, v: Expr) -> ufl.Form:
         """No form: all forces are those of the passes."""
         return ufl.Form([])
+
+    @property
+    def companions(self) -> Sequence[Term]:
+        """The fields of the bond, on each part of the slave."""
+        slaves = [p for p, sign in zip(self.passes, self.signs, strict=True) if sign > 0] if self.law else []
+        names = [f"{self.name}_bond{i + 1 if len(slaves) > 1 else ''}" for i in range(len(slaves))]
+        return [BondFields(n, p.points, p.history.point_values) for n, p in zip(names, slaves, strict=True)]
 
     @property
     def assemblers(self) -> Sequence[SurfacePass]:
