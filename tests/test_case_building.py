@@ -218,7 +218,7 @@ def test_faces_of_a_crack_slide(written, surfaces):
     [
         ("", "pair.slave: missing"),
         ('slave = "crack+"\nautomatic = true', "pair.slave: .*not allowed beside automatic"),
-        ('slave = "crack"\nmaster = "crack-"', "pair.slave.*: .*between two cells"),
+        ('slave = "crack"\nmaster = "crack-"', "pair.slave: .*face of a cut"),
         ('slave = "crack+"\nmaster = "crack*"', r"pair.master: 'crack\*': must be one of the surfaces"),
         ('slave = "top"\nlaw = { model = "exponential", strength = 1, opening = 1 }', "pair.law: .*meets itself"),
     ],

@@ -48,7 +48,12 @@ class Face:
         facets = np.unique(np.asarray(facets, dtype=np.int32))
         owned = facets < mesh.topology.index_map(tdim - 1).size_local
         inner = mesh.comm.allreduce(int(np.count_nonzero(np.diff(to_cells.offsets)[facets[owned]] != 1)))
-        require(name, f"{inner} facets between two cells", inner == 0, "of the outer boundary: of a cut, name a face")
+        require(
+            name,
+            f"{inner} facets between two cells",
+            inner == 0,
+            "on the outer boundary, or a face of a cut (of a crack, such as crack+)",
+        )
         return cls._of(mesh, facets, to_cells.array[to_cells.offsets[facets]])
 
     @classmethod
