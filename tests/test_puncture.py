@@ -10,6 +10,7 @@ from cutsim import (
     Drive,
     Exponential,
     Faces,
+    Fixture,
     Insertion,
     MeshRule,
     NeoHookean,
@@ -85,3 +86,25 @@ def test_faces_of_a_thread_are_not_alike():
     domain = read_geo(geometry("thread"), COMM, {"R": 1, "H": 2, "deep": 1, "lc": 0.3, "notch": 0}, gdim=2)
     with pytest.raises(ValueError, match=r"faces.symmetric = True .* body of revolution"):
         cracked_block(domain, SOLID, BOND, axisymmetric=True, faces=Faces(symmetric=True))
+
+
+def test_a_body_that_is_held_at_its_ends_is_cut_through():
+    """The bond is spent to its end, and on the shank between the two halves there is no force any more."""
+    body = cracked_block(block(notch=0.4, Lx=1.0), SOLID, BOND, viscosity=0.005, faces=Faces(True, 0.3))
+    tool, ends = Blade(np.radians(30), 0.1, 0.2), Fixture(ends=("far_left", "far_right"))
+    cut, rows = Insertion.build(body, tool, Drive(1.0), notch=0.4, fixture=ends), []
+    run(
+        cut.mechanics,
+        cut.time_of(1.0 + 3 * tool.shaft_height),
+        StepControl(first=0.02, largest=0.1, closure=5e-3),
+        lambda report: rows.append(report.columns | cut.columns(report.columns)),
+    )
+    column = {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
+    assert column["front"][-1] == pytest.approx(0.6)
+    x = 2 * tool.width / BOND.opening  # the shank holds the halves this far apart, in characteristic openings
+    spent = column["energy_fracture"][-1] + column["energy_cohesive_stored"][-1]
+    assert spent == pytest.approx(0.6 * BOND.toughness * (1 - (1 + x) * np.exp(-x)), rel=0.02)
+    assert column["force"].max() > 0.5 * BOND.toughness and abs(column["force"][-1]) < 0.02 * BOND.toughness
+    assert np.abs(column["energy_closure"]).max() < 0.02
+    with pytest.raises(ValueError, match="depth"):
+        Insertion.build(body, tool, Drive(1.0), notch=0.4).time_of(1.1)

@@ -192,7 +192,7 @@ def _contacts(
     faces: list[tuple[Literal["+", "-"], int, str]] = [("+", plus, top[1])]
     if not body.state.axisymmetric:  # there the thread does not meet the tool
         faces.append(("-", -plus, top[0]))
-    indents = body.notch is None and (bool(body.guides) or body.state.axisymmetric)
+    firm = bool(body.guides) or (body.notch is None and body.state.axisymmetric)
     found = []
     for face, side, group in faces:
         half = tool if body.state.axisymmetric else replace(tool, side=side)  # type: ignore[type-var]
@@ -204,7 +204,7 @@ def _contacts(
                 half,
                 motion.path(frame, half),
                 _surfaces(body, crack, face, group),
-                contact=half.firm_contact(crack.young, crack.normal_size) if indents else soft,
+                contact=half.firm_contact(crack.young, crack.normal_size) if firm else soft,
                 friction=completed(friction, soft.stiffness),
                 name=name,
             )

@@ -91,7 +91,7 @@ class Pointed(ABC):
 
     @staticmethod
     def firm_contact(young: float, h: float) -> PenaltyContact:
-        """Contact law on an intact surface, where a tip presses much harder than in a cut.
+        """Contact law for an intact surface, on which a tip presses much harder than in a cut.
 
         The pressure grows with the square of the penetration. At 25 times Young's modulus that is a tenth of h.
 
