@@ -64,6 +64,7 @@ from .materials.fibres import DispersedFibres as DispersedFibres
 from .materials.fibres import EllipsoidalFibres as EllipsoidalFibres
 from .materials.fibres import ExponentialFibres as ExponentialFibres
 from .materials.fibres import Reinforced as Reinforced
+from .materials.orthotropic import Orthotropic as Orthotropic
 from .materials.rubbers import ArrudaBoyce as ArrudaBoyce
 from .materials.rubbers import IsochoricOgden as IsochoricOgden
 from .materials.rubbers import MooneyRivlin as MooneyRivlin

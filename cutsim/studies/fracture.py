@@ -319,11 +319,23 @@ class CantileverBeams:
         return load, load * effective**3 / (1.5 * self.rigidity)
 
 
-def crack_length_correction(young: float, shear: float) -> float:
-    """χ = √(E/(11 G) (3 − 2 (Γ/(1+Γ))²)), Γ = 1.18 E/G, of isotropic arms (Williams 1989) [–]; 0.663 for ν = 0.3."""
+def crack_length_correction(young: float, shear: float, *, across: float | None = None) -> float:
+    """χ = √(E₁₁/(11 G₁₃) (3 − 2 (Γ/(1+Γ))²)), Γ = 1.18 √(E₁₁ E₂₂)/G₁₃, of DCB arms (Williams 1989) [–].
+
+    It makes up for what the arms turn and shear beyond the front; 0.663 for isotropic arms with ν = 0.3.
+
+    Args:
+        young: Modulus E₁₁ along the arms [stress].
+        shear: Shear modulus G₁₃ in the plane in which they bend [stress].
+        across: Modulus E₂₂ normal to the crack [stress]; None for isotropic arms.
+
+    Raises:
+        ValueError: A modulus is not positive.
+    """
     require_number("young", young, positive)
     require_number("shear", shear, positive)
-    gamma = 1.18 * young / shear
+    require_number("across", across, positive.or_none)
+    gamma = 1.18 * sqrt(young * (young if across is None else across)) / shear
     return sqrt(young / (11 * shear) * (3 - 2 * (gamma / (1 + gamma)) ** 2))
 
 

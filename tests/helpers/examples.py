@@ -14,6 +14,7 @@ from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.materials.anisotropic import FungOrthotropic, TransverselyIsotropic
 from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
 from cutsim.materials.fibres import DispersedFibres, EllipsoidalFibres, ExponentialFibres, Reinforced
+from cutsim.materials.orthotropic import Orthotropic
 from cutsim.materials.rubbers import ArrudaBoyce, IsochoricOgden, MooneyRivlin, Ogden, Yeoh
 from cutsim.tools.needle_tips import BevelNeedle, HollowNeedle
 from cutsim.tools.pointed import Blade, Needle
@@ -100,8 +101,10 @@ ISOTROPIC = [
     IsochoricOgden((0.5, 0.3), (1.3, -2.0), 4.0),
 ]
 AXIS = (0.6, 0.8, 0.0)
+ORTHOTROPIC = Orthotropic(4.0, 1.0, 2.0, 0.3, 0.25, 0.2, 0.7, 0.9, 0.4, (AXIS, (-0.8, 0.6, 0.0)))
 ANISOTROPIC = [
     TransverselyIsotropic(AXIS, 1.0, 0.3, 4.0, 0.2, 0.7),
+    ORTHOTROPIC,
     FungOrthotropic(0.2, (3.0, 2.0, 1.5), (0.5, 0.4, 0.3), (1.0, 0.8, 0.9), 4.0, (AXIS, (-0.8, 0.6, 0.0))),
     Reinforced(MOONEY, (ExponentialFibres(AXIS, 0.8, 0.5, 2.5),)),
     Reinforced(NeoHookean(E, NU), (DispersedFibres(AXIS, 0.8, 0.5, 0.1), DispersedFibres((0.0, 0.6, 0.8), 0.8, 0.5))),
