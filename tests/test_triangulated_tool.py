@@ -128,6 +128,25 @@ def test_same_as_the_blade():
     np.testing.assert_allclose(ends[1][1], ends[0][1], rtol=0.01)
 
 
+@pytest.mark.mpi
+@pytest.mark.parametrize("side", ["+", "-"])
+def test_face_of_a_crack(side):
+    """Between two faces that have parted, each is pressed to its own side: the penalty times what the ball covers."""
+    b, depth = make_blocks(2, n=16), 0.05
+    crack, sign = b.crack(None), {"+": -1, "-": 1}[side]  # '+' is the lower block
+    b.move(lambda x: 0 * x, lambda x: np.array([0 * x[0], 0 * x[0] + 0.5]))
+    middle = {"+": 0.5, "-": 1.0}[side] - sign * (R - depth)
+    path = ToolPath.polyline([0, 1], [(0.45, middle), (0.48, middle)])
+    tool = TriangulatedTool(b.state, crack.face(side), ball(2, 5), path, contact=CONTACT, friction=FRICTION)
+    b.state.memory.commit()
+    b.state.begin(1.0)
+    tool.begin()
+    tool.evaluate()
+    area = R**2 * np.arccos(1 - depth / R) - (R - depth) * np.sqrt(2 * R * depth - depth**2)
+    assert tool.force()[1] == pytest.approx(-sign * CONTACT.stiffness * area, rel=0.01), "the face pushes back"
+    assert tool.force()[0] == pytest.approx(-MU * CONTACT.stiffness * area, rel=0.02), "friction holds back"
+
+
 # -- balance ----------------------------------------------------------------------------------------------------------
 
 

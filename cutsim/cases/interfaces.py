@@ -93,7 +93,7 @@ def _pair(
         sides: list[Sequence[Face]] = [surfaces.faces, ()]
         young = surfaces.young
     else:
-        sides = [_surface(domain, (*key, side), getattr(table, side), cracks) for side in ("slave", "master")]
+        sides = [faces_of(domain, (*key, side), getattr(table, side), cracks) for side in ("slave", "master")]
         young = min(softest(solids, face.facets) for side in sides for face in side)
     with refusing(domain.document, *key):
         return SurfacePair(
@@ -112,7 +112,7 @@ def _pair(
         )
 
 
-def _surface(domain: Domain, key: Keys, names: Sequence[str], cracks: Mapping[str, Crack]) -> Sequence[Face]:
+def faces_of(domain: Domain, key: Keys, names: Sequence[str], cracks: Mapping[str, Crack]) -> Sequence[Face]:
     """The faces of a surface, of which outer ones are one. Collective."""
     sides = {f"{name}{side}": (crack, side) for name, crack in cracks.items() for side in _SIDES}
     faces = [crack.face(side) for crack, side in (sides[name] for name in names if name in sides)]

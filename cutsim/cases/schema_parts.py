@@ -183,6 +183,8 @@ class Tool(Constructed):
 class SurfaceTool(Tool):
     """Rigid tool of triangles, or of segments in the plane, from an STL, OBJ or PLY file.
 
+    Its surfaces may have one face of a crack, such as "glue+"; a tool between both faces is two of these.
+
     Args:
         file: The file, relative to the case file.
         scale: Length in the units of the case of one unit of the file, > 0.

@@ -11,9 +11,11 @@ from cutsim.cases import schema_parts as schema
 from cutsim.cases.bodies import softest
 from cutsim.cases.domains import Domain
 from cutsim.cases.expressions import TimeValue, corners_of
+from cutsim.cases.interfaces import faces_of
 from cutsim.cases.keys import Keys
 from cutsim.cases.refusals import refusing
 from cutsim.cases.rigs import face_of, function, machines
+from cutsim.fields.faces import Face
 from cutsim.fields.points import Surface
 from cutsim.fields.sizes import normal_size
 from cutsim.fields.state import State
@@ -40,7 +42,7 @@ def tools(
     found: dict[str, RigidTool] = {}
     for name, table in domain.tables.tools.items():
         if isinstance(table, schema.SurfaceTool):
-            found[name] = _triangulated(domain, solids, name, table, temperature)
+            found[name] = _triangulated(domain, solids, name, table, cracks, temperature)
         else:
             found[name] = _shaped(domain, solids, name, table, cracks, temperature)
     return found
@@ -84,17 +86,20 @@ def _triangulated(
     solids: tuple[Solid, ...],
     name: str,
     table: schema.SurfaceTool,
+    cracks: Mapping[str, Crack],
     temperature: Temperature | None,
 ) -> TriangulatedTool:
     key, state = ("tools", name), solids[0].state
-    facets = domain.facets((*key, "surfaces"), table.surfaces)
+    face = Face.joined(faces_of(domain, (*key, "surfaces"), table.surfaces, cracks))
     with refusing(domain.document, *key):
+        once = len(np.unique(face.facets)) == len(face.facets)
+        require("surfaces", list(table.surfaces), once, "one face of a crack: the other one takes a tool of its own")
         surface = Triangulation.read(table.file, table.scale, comm=state.mesh.comm)
-        contact = table.contact or _contact(None, solids, [Surface.exterior(state, facets)])
+        contact = table.contact or PenaltyContact.automatic(softest(solids, face.facets), _size(state, face))
         friction, path = friction_of(table, temperature), path_of(table)
         return TriangulatedTool(
             state,
-            facets,
+            face,
             surface,
             path,
             contact=contact,
@@ -114,6 +119,14 @@ def _surface(domain: Domain, state: State, key: Keys, name: str, cracks: Mapping
     facets = domain.facets(key, [name])
     with refusing(domain.document, *key):
         return Surface.exterior(state, facets)
+
+
+def _size(state: State, face: Face) -> float:
+    """Mean size of the cells normal to a face, those of the '+' side of a crack [length]. Collective."""
+    owned = face.cells < state.mesh.topology.index_map(state.mesh.topology.dim).size_local
+    sizes = normal_size(state.mesh, face.facets)[owned]
+    total, count = state.mesh.comm.allreduce(np.array([sizes.sum(), len(sizes)]))
+    return float(total / count)
 
 
 def _contact(shape: object, solids: tuple[Solid, ...], surfaces: list[Surface]) -> PenaltyContact:

@@ -103,14 +103,15 @@ class _Touch(SurfacePass):
 
 
 class TriangulatedTool(RigidTool):
-    """Contact between a rigid tool of triangles and an outer surface of the body.
+    """Contact between a rigid tool of triangles and an outer surface of the body, or a face of a crack.
 
     The points of the body find the tool along their own normals, as in a pair of surfaces: the traction turns with the
     surface of the body and is continuous where points slide over the edges of the triangles.
 
     Args:
         state: Displacement, of degree 1 or 2, and time.
-        facets: Local exterior facets that the tool can touch, ghosts included.
+        facets: Local exterior facets that the tool can touch, ghosts included, or one face of a crack (`Crack.face`);
+            a tool between both faces is two of these.
         surface: Surface of the tool relative to its reference point, the same on all ranks.
         path: Motion of the reference point, and rotation about it.
         contact: Contact law; the pressure acts per reference area.
@@ -134,7 +135,7 @@ class TriangulatedTool(RigidTool):
     def __init__(
         self,
         state: State,
-        facets: NDArray[np.int32],
+        facets: NDArray[np.int32] | Face,
         surface: Triangulation,
         path: ToolPath,
         *,
@@ -151,7 +152,7 @@ class TriangulatedTool(RigidTool):
         require_number("search", search, positive.or_none)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
         require("surface", surface.points.shape, surface.points.shape[1] == gdim, f"of nodes of {gdim} components")
-        face = Face.outer(state.mesh, facets)
+        face = facets if isinstance(facets, Face) else Face.outer(state.mesh, facets)
         points = slave_points(state, face, "facets")
         size = points.mean(facet_size(state.mesh, points.facets))
         master = RigidSurface(surface, (self._position, self._rotation))
@@ -162,7 +163,7 @@ class TriangulatedTool(RigidTool):
         laws = PairLaws(None, contact, completed(friction, contact.stiffness), allowed_penetration)
         self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0, tool=self.temperature)
         if self._guide is not None:
-            nodes = locate_dofs(state.V, gdim - 1, facets)
+            nodes = locate_dofs(state.V, gdim - 1, face.facets)
             self._driven = DrivenAssembler(
                 state, name, self._guide, lambda: self.move(1.0), contact=self.touch, nodes=nodes, machines=machines
             )
