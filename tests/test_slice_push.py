@@ -22,7 +22,7 @@ TOUGHNESS, WIDTH, HALF_ANGLE, MU = 0.1, 0.2, np.radians(20), 0.2
 
 
 def steady_forces(ratio, friction):
-    """Forces along push and slice and friction work per push, over the width of a strip that walls hold along the edge."""
+    """Forces along push and slice, and friction work per push, over the width; walls hold the strip along the edge."""
     sizes = {"dim": 3, "Lx": 1.0, "H": 4.5, "lc": 0.2, "band": 0.3, "growth": 1.6, "notch": 0.5, "B": WIDTH, "nz": 1}
     domain = read_geo(geometry("block"), MPI.COMM_WORLD, sizes, gdim=3)
     body = cracked_block(
