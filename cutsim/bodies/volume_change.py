@@ -80,6 +80,11 @@ class VolumeChange:
             f.x.scatter_forward()
 
     @property
+    def rate_dependent(self) -> bool:
+        """False: the pressure depends on the displacement alone, not on how long a step takes."""
+        return False
+
+    @property
     def pattern(self) -> int:
         """Always the same."""
         return 0

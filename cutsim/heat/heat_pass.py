@@ -75,6 +75,11 @@ class HeatPass:
         self.exchange.evaluate()
 
     @property
+    def rate_dependent(self) -> bool:
+        """False: what flows depends on the temperatures alone, not on how long a step takes."""
+        return False
+
+    @property
     def pattern(self) -> int:
         """Number of the sparsity pattern."""
         return self.contact.pattern
