@@ -566,3 +566,16 @@ def test_each_number_with_a_unit_has_its_kind():
     assert len(numbers) > 60
     assert not [(name, key) for name, key, entry in numbers if not set(kinds_in(entry)) - {"one"}]
     assert tables["NeoHookean"]["young"]["description"].endswith("Unit: MPa unless [units] says otherwise.")
+
+
+def test_a_formula_takes_columns_and_numbers_of_the_file():
+    scope = Scope({"parameters": {"h": 2.0, "now": "2*t"}, "law": {"toughness": "1.5*h"}}, Units())
+    formula = scope.formula("h*force**2/law.toughness")
+    assert formula({"force": 3.0}) == pytest.approx(6.0)
+    assert math.isnan(scope.formula("force/way")({"force": 1.0, "way": 0.0}))
+    with pytest.raises(ValueError, match="'fore' is neither a number of this file nor one of the columns force"):
+        scope.formula("fore")({"force": 1.0})
+    with pytest.raises(ValueError, match="must not have 'now', which depends on time"):
+        scope.formula("now*force")
+    with pytest.raises(ValueError, match="no expression"):
+        scope.formula("force +")

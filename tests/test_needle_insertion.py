@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 from cutsim import Blade, Drive, Exponential, Insertion, Needle, NeoHookean, StepControl, cracked_block, read_geo, run
 from cutsim.analysis.stepping import begin
+from cutsim.studies.drive import Motion
 from cutsim.studies.insertion_work import TwoInsertions, audited_toughness, force_parts
 from cutsim.tools.tool_parts import PARTS
 
@@ -259,6 +260,17 @@ def test_every_number_of_ranks_gives_the_same_history(build):
     ):
         scale = max(np.abs(alone[name]).max(), 1e-6)
         assert np.abs(together[name] - alone[name]).max() <= 1e-7 * scale, name
+
+
+def test_a_tool_rests_before_it_turns():
+    drive = Drive(2.0, entry_time=1.0, turning_depth=1.4, dwell=0.5)
+    motion = Motion.of(drive, Needle(0.5, 0.15, RADIUS), 0.5, 5.0)  # the push begins at 0.4
+    np.testing.assert_allclose(motion.corners, [1.0, 1.5, 2.0, 2.5])
+    times = [1.0, 1.25, 1.5, 1.75, 2.0, 2.25, 2.5, 3.0, 3.5]
+    np.testing.assert_allclose([motion.depth(t) for t in times], [0.4, 0.9, 1.4, 1.4, 1.4, 0.9, 0.4, 1.4, 2.4])
+    assert motion.time_of(2.4, 2) == pytest.approx(3.5)
+    with pytest.raises(ValueError, match=r"dwell = 0\.5 is not allowed"):
+        Drive(2.0, dwell=0.5)
 
 
 def test_parameters_are_refused_by_name():

@@ -1,4 +1,4 @@
-"""The one balance of mechanics and heat: total energy, entropy, and available energy (docs/theory.md §6)."""
+"""The one balance of mechanics and heat: total energy, entropy, and available energy (docs/heat.md)."""
 
 from collections.abc import Sequence
 from math import nan

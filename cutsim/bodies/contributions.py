@@ -151,7 +151,7 @@ class Heating(Contribution):
     def heat(self, w: Expr) -> ufl.Form:
         """Heat of the thermoelastic effect in the step: Δ(T ∂W/∂T) less what the change of temperature brings.
 
-        It is T Δ(∂W/∂T) to second order, and leaves the sum of internal energies as it is (docs/theory.md §6).
+        It is T Δ(∂W/∂T) to second order, and leaves the sum of internal energies as it is (docs/heat.md).
         """
         T, old = self._temperature.value, self._temperature.old
         state = self._formulation.elasticity.state

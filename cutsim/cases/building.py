@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from cutsim.cases.heating import coupled, temperature
 from cutsim.cases.holding import loads, supports
 from cutsim.cases.insertions import inserted
 from cutsim.cases.interfaces import crack_friction, cracks, pairs
-from cutsim.cases.measures import Measure, measures, tool_measures
+from cutsim.cases.measures import columns_of, measures, tool_measures
 from cutsim.cases.parts import Parts
 from cutsim.cases.refusals import refused, refusing
 from cutsim.cases.rigs import links
@@ -137,7 +138,8 @@ def _insertion(domain: Domain) -> Simulation:
     found = measures(domain, parts)
 
     def columns(row: Columns) -> Columns:
-        return cut.columns(row) | _values(found)
+        own = cut.columns(row)
+        return own | columns_of(domain, found, {**row, **own})
 
     return _simulation(domain, problem, parts, end, columns, ("depth", "force"), _mirror(cut), cut)
 
@@ -168,7 +170,7 @@ def _general(domain: Domain) -> Simulation:
     found = measures(domain, parts)
     end = domain.tables.analysis.until
     found |= tool_measures(rigid, 1.0 if end is None else end)
-    return _simulation(domain, problem, parts, None, lambda _: _values(found), _curve(domain, rigid), ())
+    return _simulation(domain, problem, parts, None, partial(columns_of, domain, found), _curve(domain, rigid), ())
 
 
 def _mechanics_options(domain: Domain) -> dict[str, Any]:
@@ -237,7 +239,3 @@ def _curve(domain: Domain, rigid: Mapping[str, Any]) -> tuple[str, str]:
             if value != 0.0:
                 return f"{name}_{coordinate}", f"{name}_{coordinate}_{'moment' if coordinate[0] == 'r' else 'force'}"
     return "time", "work_external"
-
-
-def _values(found: Mapping[str, Measure]) -> Columns:
-    return {name: (float(value()), kind) for name, (value, kind) in found.items()}

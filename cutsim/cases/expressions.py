@@ -128,6 +128,38 @@ class TimeExpression:
 
 
 @dataclass(frozen=True)
+class RowExpression:
+    """Function of the columns of a step that an expression gives.
+
+    Args:
+        text: The expression, in which names are those of columns.
+        names: Values of the other names in it.
+    """
+
+    text: str
+    names: tuple[tuple[str, float], ...] = ()
+
+    def __call__(self, row: Mapping[str, float]) -> float:
+        """Value in a step; nan where it is no finite number, such as a ratio of zeros.
+
+        Args:
+            row: Columns of the step.
+
+        Raises:
+            ValueError: It has a name that is no column.
+        """
+        known = {**row, **dict(self.names)}
+        for name in sorted(names_in(self.text)):
+            if name not in known:
+                columns = ", ".join(row)
+                raise ValueError(f"{name!r} is neither a number of this file nor one of the columns {columns}")
+        try:
+            return evaluate(self.text, known)
+        except ValueError:
+            return math.nan
+
+
+@dataclass(frozen=True)
 class TimeTable:
     """Function of time that a table gives: straight between its points, constant before the first and after the last.
 

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from cutsim.base.arrays import Array
+from cutsim.base.terms import Columns
 from cutsim.cases import schema_run as schema
 from cutsim.cases.domains import Domain
 from cutsim.cases.parts import Parts
@@ -26,7 +27,28 @@ def measures(domain: Domain, parts: Parts) -> dict[str, Measure]:
     Raises:
         CaseError: A crack or body is unknown, or a measure refuses a parameter.
     """
-    return {name: _measure(domain, parts, name, table) for name, table in domain.tables.measures.items()}
+    tables = domain.tables.measures.items()
+    return {name: _measure(domain, parts, name, table) for name, table in tables if table.kind != "formula"}
+
+
+def columns_of(domain: Domain, found: Mapping[str, Measure], row: Columns) -> Columns:
+    """Columns of what is measured in a step, formulas last. Collective.
+
+    Args:
+        domain: The mesh of the case.
+        found: What is measured.
+        row: Columns that the step has already.
+
+    Raises:
+        CaseError: A formula has a name that is no column.
+    """
+    measured: Columns = {name: (float(value()), kind) for name, (value, kind) in found.items()}
+    for name, table in domain.tables.measures.items():
+        if isinstance(table, schema.Formula):
+            with refusing(domain.document, "measures", name, "value"):
+                values = {column: value for column, (value, _) in {**row, **measured}.items()}
+                measured[name] = table.value(values), table.quantity
+    return measured
 
 
 def _measure(domain: Domain, parts: Parts, name: str, table: schema.Front | schema.DomainIntegral) -> Measure:

@@ -7,7 +7,16 @@ from itertools import pairwise
 from typing import Any
 
 from cutsim.base.units import Kind, Units
-from cutsim.cases.expressions import FUNCTIONS, TIME, TimeExpression, TimeTable, TimeValue, evaluate, names_in
+from cutsim.cases.expressions import (
+    FUNCTIONS,
+    TIME,
+    RowExpression,
+    TimeExpression,
+    TimeTable,
+    TimeValue,
+    evaluate,
+    names_in,
+)
 from cutsim.cases.keys import full, nearest
 from cutsim.cases.quantities import Converter, split
 
@@ -57,6 +66,23 @@ class Numbers:
         except ValueError as error:
             reason = f": {error}" if str(error) else ""
             raise ValueError(f"must be {self._allowed(kind, varying)}{reason}") from None
+
+    def formula(self, text: Any) -> RowExpression:
+        """The function of columns that an expression stands for; its other names are numbers of the file.
+
+        Args:
+            text: The expression.
+
+        Raises:
+            ValueError: It is no expression, or depends on time by itself.
+        """
+        if not isinstance(text, str):
+            raise ValueError("must be an expression in columns of the history")
+        names = [name for name in sorted(names_in(text)) if self._find(name) is not None]
+        values = {name: self._value(name) for name in names}
+        if moving := [name for name, value in values.items() if callable(value)]:
+            raise ValueError(f"must not have {moving[0]!r}, which depends on time, but columns of the history")
+        return RowExpression(text, tuple(values.items()))  # type: ignore[arg-type]
 
     def _allowed(self, kind: Kind | None, varying: bool) -> str:
         """What is allowed, in words."""

@@ -4,15 +4,25 @@ from functools import reduce
 from operator import or_
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    Discriminator,
+    Field,
+    PlainValidator,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
 from pydantic_core import CoreSchema
 
 from cutsim.analysis.stepping import StepControl
 from cutsim.analysis.steps import Control
 from cutsim.base.checks import positive, require_number
-from cutsim.base.units import Length, Number, Time
+from cutsim.base.units import KINDS, Length, Number, Time
 from cutsim.bodies.schemes import Newmark, Scheme
 from cutsim.cases.constructed import Constructed, FromTable, With, annotated, choice, made, table_of
+from cutsim.cases.expressions import RowExpression
 from cutsim.cases.names import BodyName, CrackName, ToolName
 from cutsim.cases.tables import NONNEGATIVE, POSITIVE, Flag, Table, Whole, chosen_by
 from cutsim.studies.body import Faces
@@ -147,7 +157,29 @@ class DomainIntegral(Table):
     length: Annotated[Length, POSITIVE] | None = None
 
 
-Measure = Annotated[Front | DomainIntegral, Field(discriminator="kind"), chosen_by("kind", ["front", "j-integral"])]
+def _formula(value: Any, info: ValidationInfo) -> RowExpression:
+    found: RowExpression = info.context.formula(value)  # type: ignore[union-attr]
+    return found
+
+
+class Formula(Table):
+    """Column of the history that is computed from others, such as an energy-release rate from force and rotation.
+
+    Args:
+        value: Expression in names of columns, parameters and numbers of the file.
+        quantity: Kind of quantity of its value, for its unit.
+    """
+
+    kind: Literal["formula"]
+    value: Annotated[RowExpression, PlainValidator(_formula), WithJsonSchema({"type": "string"})]
+    quantity: Literal[KINDS] = "one"  # type: ignore[valid-type]
+
+
+Measure = Annotated[
+    Front | DomainIntegral | Formula,
+    Field(discriminator="kind"),
+    chosen_by("kind", ["front", "j-integral", "formula"]),
+]
 
 
 class Output(Table):

@@ -30,21 +30,25 @@ class Drive:
             [length]; None if it goes on.
         slice_push: Slice–push ratio ξ ≥ 0: speed of a blade along its edge over the speed of the push, from the
             beginning of the push on, in space [–].
+        dwell: Time ≥ 0 for which it rests there before [time].
 
     Raises:
-        ValueError: A number is outside its range.
+        ValueError: A number is outside its range, or the tool is to rest without a turning depth.
     """
 
     speed: Velocity
     entry_time: Time | None = None
     turning_depth: Length | None = None
     slice_push: Number = 0.0
+    dwell: Time = 0.0
 
     def __post_init__(self) -> None:
         require_number("speed", self.speed, positive)
         require_number("entry_time", self.entry_time, positive.or_none)
         require_number("turning_depth", self.turning_depth, positive.or_none)
         require_number("slice_push", self.slice_push, nonnegative)
+        require_number("dwell", self.dwell, nonnegative)
+        require("dwell", self.dwell, not self.dwell or self.turning_depth is not None, "0 without a turning_depth")
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,7 @@ class Motion:
         reach: Depth that the tip has to stay above: that of the body's far side, or infinity if the body is held at
             its ends and may fall in two [length].
         slice_speed: Speed along the edge, from the beginning of the push on [length/time].
+        dwell: Time for which it rests there before [time].
     """
 
     speed: float
@@ -72,6 +77,7 @@ class Motion:
     turning_depth: float | None
     reach: float
     slice_speed: float = 0.0
+    dwell: float = 0.0
 
     @classmethod
     def of(cls, drive: Drive, tool: Pointed, notch: float, reach: float) -> "Motion":
@@ -87,7 +93,8 @@ class Motion:
             require_number("turning_depth", drive.turning_depth, between(0, reach, name="the height of the body"))
         entry_time, slice_speed = drive.entry_time or start_height / drive.speed, drive.slice_push * drive.speed
         require("drive.slice_push", drive.slice_push, not slice_speed or len(tool.push) == 3, "0 in the plane")
-        return cls(drive.speed, start_height, start_depth, entry_time, drive.turning_depth, reach, slice_speed)
+        moving = drive.turning_depth, reach, slice_speed, drive.dwell
+        return cls(drive.speed, start_height, start_depth, entry_time, *moving)
 
     @property
     def pushes(self) -> int:
@@ -99,7 +106,9 @@ class Motion:
         """Times at which the velocity jumps [time]."""
         if self.turning_depth is None:
             return (self.entry_time,)
-        return self.entry_time, self.time_of(self.turning_depth), self.time_of(self.start_depth, 2)
+        turning = self.time_of(self.turning_depth)
+        rest = (turning + self.dwell,) if self.dwell else ()
+        return self.entry_time, turning, *rest, self.time_of(self.start_depth, 2)
 
     def time_of(self, depth: float, push: int = 1) -> float:
         """Time at which the tip is this deep below the surface in the first or second push [time].
@@ -114,7 +123,7 @@ class Motion:
         if turning is not None:
             require("depth", depth, push == 2 or depth <= turning, f"<= turning_depth = {turning}")
             way += 2 * (turning - self.start_depth) * (push - 1)
-        return self.entry_time + way / self.speed
+        return self.entry_time + way / self.speed + self.dwell * (push - 1)
 
     def depth(self, time: float) -> float:
         """Depth of the tip of a whole tool at a time [length]."""
@@ -122,6 +131,8 @@ class Motion:
         if way < 0:
             return self.start_depth - self.start_height * (1 - time / self.entry_time)
         leg = np.inf if self.turning_depth is None else self.turning_depth - self.start_depth
+        if way > leg:
+            way = max(leg, way - self.speed * self.dwell)
         return self.start_depth + (way if way <= leg else abs(2 * leg - way))
 
     def path(self, frame: Frame, tool: Pointed) -> ToolPath:
