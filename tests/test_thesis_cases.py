@@ -113,3 +113,15 @@ def test_a_block_is_sheared_off_and_slides_on():
     np.testing.assert_allclose(warmed, given, rtol=1e-6, atol=1e-9)
     assert np.diff(found["total_entropy"]).min() > -1e-12
     np.testing.assert_allclose(found["total_energy"], found["work_external"], atol=0.01 * given[-1])
+
+
+# -- double cantilever beam with rigid ends ---------------------------------------------------------------------------
+
+
+def test_j_of_the_rigid_ends_is_that_of_the_opening():
+    """2 F θ, from the ends alone, is the work of the bond up to the opening of the tip, by the law alone."""
+    changes = {"parameters.opening": "0.036", "steps.first": "0.004", "steps.largest": "0.004", "mesh.set.lc": "0.5"}
+    found = rows("dcb-force", **changes)
+    assert found["crack_opening"][-1] > 2 * 0.001, "much of the bond at the tip is broken"
+    assert found["J"][-1] == pytest.approx(found["J_of_opening"][-1], rel=0.03)
+    assert found["G_compliance"][-1] < 0.9 * found["J"][-1], "beam theory knows no process zone"
