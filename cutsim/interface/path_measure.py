@@ -3,9 +3,9 @@
 from functools import cached_property
 
 import ufl
-from dolfinx import fem
+from dolfinx import fem, la
 
-from cutsim.base.assembly import Array, integrate, nodal_forces
+from cutsim.base.assembly import Array, integrate
 from cutsim.base.compat import form
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
@@ -55,7 +55,17 @@ class PathMeasure:
         slope = ufl.derivative(loss, state.u, ufl.TestFunction(state.V))
         return form(loss, entity_maps=points.entity_maps), form(slope, entity_maps=points.entity_maps)
 
+    @cached_property
+    def _vector(self) -> la.Vector:
+        """A vector of the displacement, kept: on many ranks making one costs more than filling it."""
+        dofmap = self._state.V.dofmap
+        return la.vector(dofmap.index_map, dofmap.index_map_bs)
+
     def __call__(self) -> tuple[float, Array]:
         """Loss [energy], and its derivative, owned entries [force]. Collective."""
         loss, slope = self._forms
-        return integrate(loss), nodal_forces(slope)
+        b = self._vector
+        b.array[:] = 0.0
+        fem.assemble_vector(b.array, slope)
+        b.scatter_reverse(la.InsertMode.add)
+        return integrate(loss), b.array[: len(self._state.increment)].copy()
