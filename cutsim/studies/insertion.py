@@ -146,6 +146,7 @@ class Insertion:
             "imbalance": (abs(reaction - force) / abs(force) if force else 0.0, "one"),
             "cut": (factor * sum(area.spent() for area in self.areas), kind),
             "front": (factor * sum(area.swept() for area in self.areas), kind),
+            "spent": (factor * sum(c.points.integral(c.point_values("spent")) for c in self.body.cracks), kind),
         }
         for part in PARTS:
             rows[f"{part}_force"] = (factor * self.parts.force(part), "force")

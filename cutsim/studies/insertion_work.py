@@ -173,7 +173,7 @@ class TwoInsertions:
         first: Work of the tool from its entry into the notch to the end of the first push [energy].
         second: Work in the second push, and what is held at its beginning [energy].
         losses: Friction and viscous work of the first insertion beyond that of the second [energy].
-        area: New crack area, each point by its damage, which its opening alone tells.
+        area: New crack area, each point by the part of its work that is lost for good, which its memory tells.
     """
 
     first: float
@@ -223,8 +223,7 @@ class TwoInsertions:
         )
         held = np.append(0.0, history["energy_strain"] + history["energy_contact"])
         second = float(works[1]) + whole * float(np.interp(ends[2], time, held))
-        broken = np.sum([history[f"{crack.name}_broken"] for crack in cut.body.cracks], axis=0)
-        area = whole * float(np.interp(ends[1], history["time"], broken))
+        area = float(np.interp(ends[1], history["time"], history["spent"]))
         return cls(float(works[0]), second, float(losses[0] - losses[1]), area)
 
 
