@@ -10,10 +10,12 @@ from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
+from cutsim.base.signatures import checked
 from cutsim.fields.sizes import incidence
 from cutsim.fields.space import crack_measure_entities
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class Face:
     """Facets, each with the cell on whose side it is; ghosts are included, as far as this rank knows their cell.
@@ -31,6 +33,7 @@ class Face:
     local: NDArray[np.int32]
 
     @classmethod
+    @checked
     def outer(cls, mesh: Mesh, facets: NDArray[np.int32], name: str = "facets") -> Self:
         """A part of the outer boundary. Collective.
 
@@ -57,6 +60,7 @@ class Face:
         return cls._of(mesh, facets, to_cells.array[to_cells.offsets[facets]])
 
     @classmethod
+    @checked
     def cut(
         cls,
         mesh: Mesh,
@@ -78,6 +82,7 @@ class Face:
         return cls.of_rows(mesh, crack_measure_entities(mesh, facets, plus), side)
 
     @classmethod
+    @checked
     def both(cls, mesh: Mesh, facets: NDArray[np.int32]) -> tuple[Self, Self]:
         """The two faces of cuts whose sides have no names: whichever face a facet's side belongs to. Collective.
 
@@ -98,6 +103,7 @@ class Face:
         return cls.of_rows(mesh, entities, "+"), cls.of_rows(mesh, entities, "-")
 
     @classmethod
+    @checked
     def of_rows(cls, mesh: Mesh, entities: NDArray[np.int32], side: Literal["+", "-"]) -> Self:
         """One face of the rows of `cutsim.fields.space.crack_measure_entities`. Collective."""
         require("side", side, side in ("+", "-"), "'+' or '-'")
@@ -120,6 +126,7 @@ class Face:
         return cls(facets, np.asarray(cells, dtype=np.int32), local.astype(np.int32))
 
     @classmethod
+    @checked
     def joined(cls, faces: Sequence["Face"]) -> Self:
         """Several of them as one; both faces of a cut have the same facets."""
         return cls(*(np.concatenate([getattr(f, part) for f in faces]) for part in ("facets", "cells", "local")))

@@ -8,8 +8,9 @@ import numpy as np
 from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import NDArray
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.signatures import checked
+from cutsim.base.units import Stress
 from cutsim.bodies.solid import Solid
 from cutsim.fields.faces import Face
 from cutsim.fields.space import CRACKED, sum_over_ranks
@@ -17,6 +18,7 @@ from cutsim.fields.state import State
 from cutsim.pairs.surface_pair import SurfacePair
 
 
+@checked
 @dataclass(frozen=True, eq=False)
 class ContactSurfaces:
     """Surfaces any of which may meet any other one, or itself.
@@ -29,7 +31,11 @@ class ContactSurfaces:
 
     state: State
     faces: tuple[Face, ...]
-    young: float
+    young: Stress
+
+    def __post_init__(self) -> None:
+        require("faces", self.faces, len(self.faces) > 0, "at least one surface")
+        require_number("young", self.young, positive)
 
     @classmethod
     @checked

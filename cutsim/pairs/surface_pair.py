@@ -276,7 +276,10 @@ def _faces(state: State, given: Parts, name: str) -> list[Face]:
     """The faces of a surface, the parameter of a name. Collective."""
     parts = [given] if isinstance(given, np.ndarray | Face) else list(given)
     require(name, given, bool(parts), "facets, a face, or a sequence of these that is not empty")
-    return [part if isinstance(part, Face) else Face.outer(state.mesh, part, name) for part in parts]
+    faces = [part if isinstance(part, Face) else Face.outer(state.mesh, part, name) for part in parts]
+    empty = [i for i, face in enumerate(faces) if not state.mesh.comm.allreduce(len(face.facets))]
+    require(name, given, not empty, "surfaces that have facets")
+    return faces
 
 
 def _check_apart(state: State, faces: Sequence[Face]) -> None:

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from cutsim.base.checks import require
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.signatures import checked
+from cutsim.base.units import Length
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.tools.shapes import Shape
 
@@ -15,6 +16,7 @@ _OF_OPENING = 0.4
 _ON_RADIUS, _AT_MOUTH = 3, 2
 
 
+@checked
 @dataclass(frozen=True)
 class MeshRule:
     """Sizes of the elements of a cut.
@@ -26,8 +28,12 @@ class MeshRule:
             cut begins: a third of r and half of `size` at most [length].
     """
 
-    size: float
-    mouth: float
+    size: Length
+    mouth: Length
+
+    def __post_init__(self) -> None:
+        require_number("size", self.size, positive)
+        require_number("mouth", self.mouth, positive)
 
     @classmethod
     @checked

@@ -17,6 +17,7 @@ from mpi4py import MPI
 import cutsim
 import cutsim.identify
 from cutsim.base.signatures import _fits
+from cutsim.fields.space import crack_measure_entities
 from helpers.blocks import make_blocks
 from helpers.examples import instances
 from helpers.laws import ELASTIC, EXPONENTIAL
@@ -47,6 +48,8 @@ def things():
         "control": cutsim.StepControl.fixed(1.0), "corners": corners, "coulomb": cutsim.Coulomb(0.3),
         "crack": b.crack(), "edge": edge,
         "block": block, "insertion": insertion, "drive": cutsim.Drive(1.0), "elastic": ELASTIC,
+        "face": cutsim.Face.outer(b.state.mesh, top),
+        "rows": crack_measure_entities(b.state.mesh, b.facets, b.lower),
         "entities": top, "facet_tags": laminated.facet_tags, "facets": top,
         "heat": cutsim.HeatTransfer(temperature, [conductor]), "heat law": cutsim.ContactHeat(1.0, 1.0),
         "interface": b.facets, "laminated": laminated, "layers": layers, "master_facets": right,
@@ -73,6 +76,13 @@ NAMED = {
 SPECIAL: dict[str, dict[str, Any]] = {
     "Crack": {"facets": "@interface"},
     "Drive": {"turning_depth": 1.0},
+    "ContactSurfaces": {"faces": ("@face",)},
+    "ContactSurfaces.automatic": {"bodies": ["@solid"]},
+    "Face": {"cells": "@plus", "facets": "@plus", "local": "@plus"},
+    "Face.both": {"facets": "@interface"},
+    "Face.cut": {"facets": "@interface", "side": "+"},
+    "Face.joined": {"faces": ["@face"]},
+    "Face.of_rows": {"entities": "@rows", "side": "+"},
     "FlatPunch": {"push": (0.0, -1.0)},
     "HeatBody": {"density": 1.0},
     "HeatTransfer": {"terms": ["@conductor"]},
@@ -81,6 +91,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "LayeredBlock.build": {"layers": "@layers"},
     "LineLoad": {"state": "@space", "vertices": "@edge", "direction": (0.0, 0.0, 1.0)},
     "Machine": {"mass": 1.0},
+    "MeshRule.of": {"tools": ["@blade"], "laws": ["@bond"]},
     "Prony": {"strengths": (1.0,), "times": (1.0,)},
     "TaggedMesh": {
         "mesh": "@mesh",
@@ -89,6 +100,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "tags": "@tags",
         "groups": {},
     },
+    "Refinement": {"groups": ("skin",)},
     "Temperature": {"space": "@scalars"},
     "ToolHeat": {"tool_temperature": 1.0},
     "ToolPath.polyline": {"times": [0.0, 1.0], "points": [(0.0, 0.0), (0.0, 1.0)]},
@@ -145,8 +157,8 @@ def arguments(name, item):
 
 
 def _thing(value):
-    if isinstance(value, list):
-        return [_thing(entry) for entry in value]
+    if isinstance(value, list | tuple):
+        return type(value)(_thing(entry) for entry in value)
     return things()[value[1:]] if isinstance(value, str) and value.startswith("@") else value
 
 
