@@ -42,8 +42,8 @@ def body():
 
 
 def test_units_compose():
-    symbols = "mm mm² N s MPa mJ N/mm N·mm rad mm/s K mJ/s N/(mm·s) mJ/K 1".split()
-    symbols += "K mm/s² N/mm³ N/mm³ N·s/mm² N·s/mm³ N·s²/mm⁴ 1/K".split()
+    symbols = "mm mm² N s MPa mJ N/mm N·mm rad mm/s 1/s K mJ/s N/(mm·s) mJ/K 1".split()
+    symbols += "K mm/s² N/mm³ N/mm N·s/mm N·s²/mm N·mm·s N·mm·s² N/mm³ N·s/mm² N·s/mm³ N·s²/mm⁴ 1/K".split()
     symbols += "mm²/(s²·K) N/(s·K) N/(mm·s·K) mm/(s·K) N/(mm·K) N/(mm²·s)".split()
     assert [Units().of(kind) for kind in KINDS] == symbols
     assert Units("m", "N").of("stress") == "Pa" and Units("m", "N").of("energy") == "J"
