@@ -20,11 +20,10 @@ RULE = "rule"
 #: Parameters of geometries that may be so: sizes along a crack, and with those at its mouth.
 ALONG = ("lc", "size")
 SIZES = (*ALONG, "entry")
-# a number, or that word
-_Parameter = Annotated[
-    Annotated[Literal["rule"], Tag("<rule>")] | Annotated[Free, Tag("<number>")],
-    Discriminator(lambda value: "<rule>" if value == RULE else "<number>"),
-]
+# a number, of any kind or a length, or that word
+_WHICH = Discriminator(lambda value: "<rule>" if value == RULE else "<number>")
+_Parameter = Annotated[Annotated[Literal["rule"], Tag("<rule>")] | Annotated[Free, Tag("<number>")], _WHICH]
+_Size = Annotated[Annotated[Literal["rule"], Tag("<rule>")] | Annotated[Length, POSITIVE, Tag("<number>")], _WHICH]
 
 
 class Refine(Table):
@@ -37,7 +36,7 @@ class Refine(Table):
     """
 
     groups: Annotated[Groups, Field(min_length=1)]
-    size: _Parameter = "rule"
+    size: _Size = "rule"
     growth: Annotated[Number, within(above(1))] = 1.5
 
 
