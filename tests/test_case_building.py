@@ -255,7 +255,7 @@ def test_a_tool_from_a_file_presses(written):
         ("points = [[-1, -1]]", "points = [[-1, -9]]", r"supports.corner.points\[0\]: no vertex of the mesh is near"),
         ("points = [[-1, -1]]", "points = [[-1, -1, 0]]", r"supports.corner.points\[0\]: .*: must have 2 components"),
         ('direction = "y"', 'direction = "z"', r"supports.corner.direction: 'z': must be another axis"),
-        ('facets = "far_left"', 'facets = "back"', "supports.left.facets: 'back': must be one of the groups left"),
+        ('facets = "far_left"', 'facets = "back"', "supports.left.facets: 'back': must be one of the surfaces left"),
         ("dim = 2\n", "", r"mesh.dim: missing, must be given"),
         (
             "[supports.left]",
