@@ -185,5 +185,5 @@ def test_links_that_make_no_sense_are_refused():
     held = Support(beam.state, beam.end(0.0).entities, 0)
     with pytest.raises(ValueError, match="a support holds as well"):
         Mechanics(beam.state, [beam.solid, plate], [held])
-    with pytest.raises(ValueError, match=r"body 'body' can slide along x|slide along"):
+    with pytest.raises(ValueError, match="can slide along x"):
         beam.run(beam.plate(0.0, "loose", {"y": 0.0, "rz": 0.0}))

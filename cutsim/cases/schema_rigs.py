@@ -10,13 +10,13 @@ from cutsim.base.units import (
     Damping,
     Force,
     ForcePerLength,
-    Inertia,
     Length,
     Mass,
     Moment,
+    MomentOfInertia,
     Number,
+    RotationalDamping,
     Time,
-    TurnDamping,
     Velocity,
 )
 from cutsim.bodies.machine import TURNS
@@ -91,8 +91,8 @@ class TurningMachine(Table):
 
     axis: Literal["rx", "ry", "rz"]
     stiffness: Annotated[Moment, NONNEGATIVE] = 0.0
-    damping: Annotated[TurnDamping, NONNEGATIVE] = 0.0
-    mass: Annotated[Inertia, NONNEGATIVE] = 0.0
+    damping: Annotated[RotationalDamping, NONNEGATIVE] = 0.0
+    mass: Annotated[MomentOfInertia, NONNEGATIVE] = 0.0
     force: Annotated[TimeValue, Varying("moment")] = 0.0
     weight: Moment = 0.0
     velocity: AngularVelocity = 0.0

@@ -74,9 +74,8 @@ def completed(friction: AnyFriction, stiffness: float) -> Friction | None:
     return replace(given, law=law.on_penalty(stiffness))
 
 
-def hotter(*temperatures: Expr) -> Expr:
+def hotter(first: Expr, second: Expr) -> Expr:
     """Temperature of the hotter of two sides."""
-    first, second = temperatures
     return ufl.max_value(first, second)
 
 

@@ -48,6 +48,7 @@ class Borders:
         self.loads: Array = np.empty(0)
         self._joint: PETSc.Mat | None = None
         self._blocks: list[PETSc.Mat] = []
+        self._reach: NDArray[np.int32] | None = None
         self._check(fixed)
         self._free[self.tied] = False
 
@@ -116,7 +117,7 @@ class Borders:
         displacements, unknowns = K.getSizes()[0], (mine, m)
         shapes = [(displacements, unknowns), (unknowns, displacements), (unknowns, unknowns)]
         self._blocks = [_empty(K.comm, shape) for shape in shapes]
-        self._reach: NDArray[np.int32] | None = None
+        self._reach = None
         size = 1 if inner is K else 2
         parts = [[K]] if inner is K else [[inner.getNestSubMatrix(i, j) for j in range(2)] for i in range(2)]
         columns, rows, corner = self._blocks

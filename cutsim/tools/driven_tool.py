@@ -34,8 +34,8 @@ _NOTHING = 1e-12
 Pose = tuple[Array, Array]
 
 
-class Guide:
-    """What guides a driven tool: its path, and the axes along which machines let it deviate from that.
+class MachineAxes:
+    """Path of a driven tool, and the axes along which machines let it deviate from that.
 
     Args:
         state: Displacement and time.
@@ -122,7 +122,7 @@ class DrivenTool(ABC):
     Args:
         comm: Communicator of the mesh.
         name: Name of the tool.
-        guide: Its coordinates.
+        axes: Its coordinates.
         move: Moves the tool to the end of the step.
         touched: Owned dofs of the surfaces that it can touch.
 
@@ -134,10 +134,10 @@ class DrivenTool(ABC):
     """
 
     def __init__(
-        self, comm: MPI.Comm, name: str, guide: Guide, move: Callable[[], None], touched: NDArray[np.int32]
+        self, comm: MPI.Comm, name: str, axes: MachineAxes, move: Callable[[], None], touched: NDArray[np.int32]
     ) -> None:
         self._comm = comm
-        self._name, self.guide, self.motion, self._move = name, guide, guide.motion, move
+        self._name, self.axes, self.motion, self._move = name, axes, axes.motion, move
         self.held, self.tied, self.touched = self.motion.held, np.empty(0, dtype=np.int32), touched
         self._reaction = np.zeros(len(self.held))
 
@@ -253,7 +253,7 @@ class DrivenContact(DrivenTool):
     Args:
         state: Displacement and time.
         name: Name of the tool.
-        guide: Its coordinates.
+        axes: Its coordinates.
         move: Moves the tool to the end of the step.
         pose: Position and rotation as variables of the forms.
         rotation: The rotation.
@@ -265,7 +265,7 @@ class DrivenContact(DrivenTool):
         self,
         state: State,
         name: str,
-        guide: Guide,
+        axes: MachineAxes,
         move: Callable[[], None],
         *,
         pose: tuple[Expr, Expr],
@@ -274,19 +274,19 @@ class DrivenContact(DrivenTool):
         entity_maps: EntityMaps,
     ) -> None:
         nodes = np.unique(np.concatenate([locate_face_dofs(state.V, surface.entities) for surface, _, _ in touches]))
-        super().__init__(state.mesh.comm, name, guide, move, owned_dofs(state, nodes))
+        super().__init__(state.mesh.comm, name, axes, move, owned_dofs(state, nodes))
         self._rotation = rotation
-        self._first, self._second = (_VirtualMotion(state, turns=guide.turns) for _ in range(2))
+        self._first, self._second = (_VirtualMotion(state, turns=axes.turns) for _ in range(2))
         v = ufl.TestFunction(state.V)
 
-        def summed(density: Callable[[Surface, Expr, Expr], Expr]) -> ufl.Form:
+        def over_all(density: Callable[[Surface, Expr, Expr], Expr]) -> ufl.Form:
             return sum((density(*touch) * touch[0].measure for touch in touches), start=ufl.Form([]))
 
-        work = summed(lambda surface, traction, place: ufl.dot(traction, self._first.displacement(place)))
-        column = summed(
+        work = over_all(lambda surface, traction, place: ufl.dot(traction, self._first.displacement(place)))
+        column = over_all(
             lambda surface, traction, place: self._first.change(ufl.dot(traction, surface.restrict(v)), pose)
         )
-        corner = summed(
+        corner = over_all(
             lambda surface, traction, place: self._second.change(
                 ufl.dot(traction, self._first.displacement(place)), pose
             )
@@ -296,7 +296,7 @@ class DrivenContact(DrivenTool):
         )
 
     def _slopes(self) -> tuple[list[Pose], list[list[Array]]]:
-        return self.guide.slopes(np.asarray(self._rotation.value))
+        return self.axes.slopes(np.asarray(self._rotation.value))
 
     def _each(self, evaluate: Callable[[], Array | float]) -> Array:
         """A quantity for each unknown in turn."""
@@ -327,7 +327,7 @@ class DrivenContact(DrivenTool):
             for j, other in enumerate(poses):
                 self._second.set(other)
                 found[i, j] = integrate(self._corner)
-        for i, j in np.ndindex(found.shape if self.guide.turns else (0, 0)):
+        for i, j in np.ndindex(found.shape if self.axes.turns else (0, 0)):
             self._first.set((np.zeros_like(poses[i][0]), curvature[i][j]))
             found[i, j] += integrate(self._work)
         return found

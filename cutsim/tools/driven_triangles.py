@@ -16,7 +16,7 @@ from cutsim.base.checks import require
 from cutsim.base.terms import Assembler
 from cutsim.bodies.machine import Machine
 from cutsim.fields.state import State
-from cutsim.tools.driven_tool import DrivenTool, Guide, owned_dofs
+from cutsim.tools.driven_tool import DrivenTool, MachineAxes, owned_dofs
 
 
 class DrivenAssembler(DrivenTool):
@@ -25,7 +25,7 @@ class DrivenAssembler(DrivenTool):
     Args:
         state: Displacement and time.
         name: Name of the tool.
-        guide: Its coordinates.
+        axes: Its coordinates.
         move: Moves the tool to the end of the step.
         contact: The forces of the contact; their pattern never changes.
         nodes: Local nodes (blocked dofs) that it can touch.
@@ -39,7 +39,7 @@ class DrivenAssembler(DrivenTool):
         self,
         state: State,
         name: str,
-        guide: Guide,
+        axes: MachineAxes,
         move: Callable[[], None],
         *,
         contact: Assembler,
@@ -48,11 +48,11 @@ class DrivenAssembler(DrivenTool):
     ) -> None:
         for i, machine in enumerate(machines):
             require(f"machines[{i}].axis", machine.axis, not machine.turns, "a translation for a tool of triangles")
-        super().__init__(state.mesh.comm, name, guide, move, owned_dofs(state, nodes))
+        super().__init__(state.mesh.comm, name, axes, move, owned_dofs(state, nodes))
         self._contact = contact
         index_map, size = state.V.dofmap.index_map, state.V.dofmap.index_map_bs
         self._f = owned_vector(index_map, size)
-        self._units = np.tile(guide.shifts, (1, index_map.size_local))
+        self._units = np.tile(axes.shifts, (1, index_map.size_local))
         n, total = index_map.size_local * size, index_map.size_global * size
         self._tangent = PETSc.Mat().createAIJ(((n, total), (n, total)), comm=state.mesh.comm)
         self._tangent.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)

@@ -16,7 +16,7 @@ from cutsim.fields.points import Surface, Values
 from cutsim.fields.state import State
 from cutsim.interface.doubts import doubt_penetration
 from cutsim.interface.slip import SlipHistory
-from cutsim.tools.driven_tool import DrivenTool, Guide
+from cutsim.tools.driven_tool import DrivenTool, MachineAxes
 from cutsim.tools.shapes import ToolPath
 
 _AXES = "xyz"
@@ -71,7 +71,7 @@ class RigidTool(Term, ABC):
         state.memory.array(f"{name}: temperature", self.temperature)
         none: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
         self._action = state.memory.value(f"{name}: force and moment", none)
-        self._guide = Guide(state, name, lambda t: _pose(path, t, gdim), machines) if machines else None
+        self._axes = MachineAxes(state, name, lambda t: _pose(path, t, gdim), machines) if machines else None
         self._driven: DrivenTool | None = None
         state.verdict.suppose(self._untouched, f"{name} has never touched the body")
 
@@ -88,12 +88,12 @@ class RigidTool(Term, ABC):
     @property
     def corners(self) -> tuple[float, ...]:
         """Times at which the tool's velocity or a force of a machine jumps."""
-        return self.path.corners if self._guide is None else (*self.path.corners, *self._guide.motion.corners)
+        return self.path.corners if self._axes is None else (*self.path.corners, *self._axes.motion.corners)
 
     @property
     def rate_dependent(self) -> bool:
         """Whether forces depend on the size of the step."""
-        return super().rate_dependent or (self._guide is not None and self._guide.motion.rate_dependent)
+        return super().rate_dependent or (self._axes is not None and self._axes.motion.rate_dependent)
 
     @property
     def border(self) -> Border | None:
@@ -103,7 +103,7 @@ class RigidTool(Term, ABC):
     @property
     def heading(self) -> NDArray[np.float64]:
         """Axis along which the first machine pushes it, zero if none does."""
-        axes = [] if self._guide is None else [axis for axis in self._guide.shifts if axis.any()]
+        axes = [] if self._axes is None else [axis for axis in self._axes.shifts if axis.any()]
         return np.asarray(axes[0]) if axes else np.zeros_like(self.position.value)
 
     @property
@@ -132,8 +132,8 @@ class RigidTool(Term, ABC):
         """Move the tool to where it is after a fraction of the step."""
         time = self.state.time_old + fraction * (self.state.time - self.state.time_old)
         pose = _pose(self.path, time, len(self.position.value))
-        if self._guide is not None:
-            pose = self._guide.pose(pose, self._guide.motion.ahead(fraction, time))
+        if self._axes is not None:
+            pose = self._axes.pose(pose, self._axes.motion.ahead(fraction, time))
         self.position.value[:], self.rotation.value[:] = pose
 
     def external_work(self) -> float:
@@ -165,7 +165,7 @@ class RigidTool(Term, ABC):
         gdim = len(force)
         columns = {f"{self.name}_{_AXES[i]}": (float(self.position.value[i]), "length") for i in range(gdim)}
         axes = _AXES if gdim == 3 else "z"
-        if self.path.rotation is not None or (self._guide is not None and self._guide.turns):
+        if self.path.rotation is not None or (self._axes is not None and self._axes.turns):
             angles = zip(axes, rotation_vector(self.rotation.value), strict=True)
             columns |= {f"{self.name}_rotation_{a}": (float(angle), "angle") for a, angle in angles}
         columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}

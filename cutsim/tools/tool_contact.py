@@ -228,11 +228,11 @@ class ToolContact(RigidTool):
         self.patches = tuple(Patch(state, name, s, shape, pose, laws, self.temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
-        if self._guide is not None:
+        if self._axes is not None:
             self._driven = DrivenContact(
                 state,
                 name,
-                self._guide,
+                self._axes,
                 lambda: self.move(1.0),
                 pose=pose,
                 rotation=self.rotation,

@@ -162,10 +162,10 @@ class TriangulatedTool(RigidTool):
         kinematics = CurrentPartners(state.memory, name, slave, master, search=search or size, size=size)
         laws = PairLaws(None, contact, completed(friction, contact.stiffness), allowed_penetration)
         self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0, tool=self.temperature)
-        if self._guide is not None:
+        if self._axes is not None:
             nodes = locate_dofs(state.V, gdim - 1, face.facets)
             self._driven = DrivenAssembler(
-                state, name, self._guide, lambda: self.move(1.0), contact=self.touch, nodes=nodes, machines=machines
+                state, name, self._axes, lambda: self.move(1.0), contact=self.touch, nodes=nodes, machines=machines
             )
 
     @property
