@@ -7,8 +7,8 @@ from cutsim.cases import schema_parts as schema
 from cutsim.cases.bodies import softest, solid_options, solids
 from cutsim.cases.domains import Domain, Entities
 from cutsim.cases.heating import temperature
+from cutsim.cases.interfaces import friction_of
 from cutsim.cases.refusals import refused, refusing
-from cutsim.cases.tools import friction_of
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.studies.body import CrackedBody, cracked_state

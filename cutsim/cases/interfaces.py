@@ -61,9 +61,12 @@ def crack_friction(
                 yield CrackFriction(cracks[name], friction)
 
 
-def friction_of(table: schema.Interface, temperature: Temperature | None) -> Friction | None:
-    """Friction of a crack or a pair, None for none."""
-    return Friction(table.friction, table.acts_on, table.allowed_slip, temperature) if table.friction else None
+def friction_of(table: schema.Interface | schema.Tool, temperature: Temperature | None) -> Friction | None:
+    """Friction of a crack, a pair or a tool, None for none."""
+    if not table.friction:
+        return None
+    beside = {"acts_on": table.acts_on} if isinstance(table, schema.Interface) else {}
+    return Friction(table.friction, allowed_slip=table.allowed_slip, temperature=temperature, **beside)
 
 
 def pairs(

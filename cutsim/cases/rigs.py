@@ -68,17 +68,17 @@ def place(
         return 0, domain.vertices((*key, "vertices"), table.vertices)
     if table.cells:
         return tdim, domain.cells((*key, "cells"), table.cells)
-    face = face_of(table.facets[0], cracks)
-    if face is None:
+    surface = crack_surface(table.facets[0], cracks)
+    if surface is None:
         return tdim - 1, domain.facets((*key, "facets"), table.facets)
     if len(table.facets) > 1:
         words = "must be groups of facets, or one face of a crack alone"
         raise refused(domain.document, (*key, "facets"), words, list(table.facets))
-    return tdim - 1, face
+    return tdim - 1, surface
 
 
-def face_of(name: str, cracks: Mapping[str, Crack]) -> Surface | None:
-    """A face of a crack by its name with + or −; None if the name is that of no face."""
+def crack_surface(name: str, cracks: Mapping[str, Crack]) -> Surface | None:
+    """A face of a crack by its name with + or −, as a tool or a support takes it; None for another name."""
     crack, face = cracks.get(name[:-1]), name[-1]
     if crack is None or face not in "+-":
         return None

@@ -11,18 +11,17 @@ from cutsim.cases import schema_parts as schema
 from cutsim.cases.bodies import softest
 from cutsim.cases.domains import Domain
 from cutsim.cases.expressions import TimeValue, corners_of
-from cutsim.cases.interfaces import faces_of
+from cutsim.cases.interfaces import faces_of, friction_of
 from cutsim.cases.keys import Keys
 from cutsim.cases.refusals import refusing
-from cutsim.cases.rigs import face_of, function, machines
-from cutsim.fields.faces import Face
+from cutsim.cases.rigs import crack_surface, function, machines
+from cutsim.fields.faces import Face, mean_size
 from cutsim.fields.points import Surface
 from cutsim.fields.sizes import normal_size
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
-from cutsim.interface.rubbing import Friction
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import ToolPath
@@ -74,13 +73,6 @@ def _shaped(
         )
 
 
-def friction_of(table: schema.Tool, temperature: Temperature | None) -> Friction | None:
-    """Friction of a tool, None for none."""
-    if not table.friction:
-        return None
-    return Friction(table.friction, allowed_slip=table.allowed_slip, temperature=temperature)
-
-
 def _triangulated(
     domain: Domain,
     solids: tuple[Solid, ...],
@@ -95,7 +87,9 @@ def _triangulated(
         once = len(np.unique(face.facets)) == len(face.facets)
         require("surfaces", list(table.surfaces), once, "one face of a crack: the other one takes a tool of its own")
         surface = Triangulation.read(table.file, table.scale, comm=state.mesh.comm)
-        contact = table.contact or PenaltyContact.automatic(softest(solids, face.facets), _size(state, face))
+        contact = table.contact or PenaltyContact.automatic(
+            softest(solids, face.facets), mean_size(state.mesh, [face], normal_size)
+        )
         friction, path = friction_of(table, temperature), path_of(table)
         return TriangulatedTool(
             state,
@@ -113,20 +107,12 @@ def _triangulated(
 
 def _surface(domain: Domain, state: State, key: Keys, name: str, cracks: Mapping[str, Crack]) -> Surface:
     """A group of outer facets, or a face of a crack by its name with + or −."""
-    face = face_of(name, cracks)
-    if face is not None:
-        return face
+    surface = crack_surface(name, cracks)
+    if surface is not None:
+        return surface
     facets = domain.facets(key, [name])
     with refusing(domain.document, *key):
         return Surface.exterior(state, facets)
-
-
-def _size(state: State, face: Face) -> float:
-    """Mean size of the cells normal to a face, those of the '+' side of a crack [length]. Collective."""
-    owned = face.cells < state.mesh.topology.index_map(state.mesh.topology.dim).size_local
-    sizes = normal_size(state.mesh, face.facets)[owned]
-    total, count = state.mesh.comm.allreduce(np.array([sizes.sum(), len(sizes)]))
-    return float(total / count)
 
 
 def _contact(shape: object, solids: tuple[Solid, ...], surfaces: list[Surface]) -> PenaltyContact:

@@ -1,12 +1,13 @@
 """Facets that are seen from one of their cells: parts of the outer boundary, and faces of cuts."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Self
 
 import numpy as np
 from dolfinx import la
 from dolfinx.mesh import Mesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import require
@@ -145,3 +146,13 @@ def rows(faces: Sequence[Face], cells: int) -> NDArray[np.int32]:
     """Rows (cell, local facet) of faces, those in the first so many cells, which this rank owns."""
     found = [np.column_stack([face.cells, face.local])[face.cells < cells] for face in faces]
     return np.concatenate(found).astype(np.int32)
+
+
+def mean_size(
+    mesh: Mesh, faces: Sequence[Face], size: Callable[[Mesh, NDArray[np.int32]], NDArray[np.float64]]
+) -> float:
+    """Mean of a size of the facets of some faces, such as `cutsim.fields.sizes.normal_size` [length]. Collective."""
+    cells = mesh.topology.index_map(mesh.topology.dim).size_local
+    own = np.concatenate([size(mesh, face.facets)[face.cells < cells] for face in faces])
+    total, count = mesh.comm.allreduce(np.array([own.sum(), len(own)]), op=MPI.SUM)
+    return float(total / count)

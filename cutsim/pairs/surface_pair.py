@@ -1,11 +1,9 @@
 """Large sliding between two surfaces with different meshes (docs/theory.md §3.5; thesis 4.28–4.57)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import ufl
-from dolfinx.mesh import Mesh
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
@@ -13,8 +11,7 @@ from cutsim.base.kinematics import Expr
 from cutsim.base.memory import Memory
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
-from cutsim.fields.faces import Face, rows
-from cutsim.fields.points import Values
+from cutsim.fields.faces import Face, mean_size, rows
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
@@ -105,8 +102,8 @@ class SurfacePair(Term):
         slaves = _faces(state, slave_facets, "slave_facets")
         masters = [] if master_facets is None else _faces(state, master_facets, "master_facets")
         _check_apart(state, [*slaves, *masters])
-        size = _mean(state, slaves, facet_size)
-        self.normal_size = _mean(state, slaves, normal_size)
+        size = mean_size(state.mesh, slaves, facet_size)
+        self.normal_size = mean_size(state.mesh, slaves, normal_size)
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
             doubt_law(state.verdict, name, law, young, size)
@@ -131,7 +128,10 @@ class SurfacePair(Term):
         """A part of one surface over all of the other one. Collective."""
         state, name = self.state, f"{self.name} pass {i + 1}"
         points = slave_points(state, face, "slave_facets" if self.signs[i] > 0 else "master_facets")
-        surfaces, lengths = (SlaveSurface(state.V, face, points), master), (search, _mean(state, [face], facet_size))
+        surfaces, lengths = (
+            (SlaveSurface(state.V, face, points), master),
+            (search, mean_size(state.mesh, [face], facet_size)),
+        )
         bonds = (laws.cohesive is not None, small_sliding)
         kinematics = _partners(state.memory, name, surfaces, lengths, bonds, folding=self.folding)
         weight = 0.5 if self.folding or -1 in self.signs else 1.0
@@ -287,11 +287,3 @@ def _check_apart(state: State, faces: Sequence[Face]) -> None:
     sides = rows(faces, state.mesh.topology.index_map(state.mesh.topology.dim).size_local)
     twice = state.mesh.comm.allreduce(len(sides) - len(np.unique(sides, axis=0)))
     require("slave_facets", f"{twice} facets", twice == 0, "no facet of master_facets, and none twice")
-
-
-def _mean(state: State, faces: Sequence[Face], measure: Callable[[Mesh, NDArray[np.int32]], Values]) -> float:
-    """Mean of a size of the facets of some faces. Collective."""
-    owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
-    own = np.concatenate([measure(state.mesh, face.facets)[face.cells < owned] for face in faces])
-    total, count = state.mesh.comm.allreduce(np.array([own.sum(), len(own)]), op=MPI.SUM)
-    return float(total / count)
