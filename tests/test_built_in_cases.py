@@ -158,7 +158,7 @@ def test_the_weight_of_bodies_rests_on_their_support(tmp_path):
 
 def test_a_group_that_the_mesh_lacks_is_named():
     case = read_case(CASES["dcb"], {"supports.clamp.facets": "front"}, quick=True)
-    words = "supports.clamp.facets: 'front': must be one of the groups .*end, top, bottom"
+    words = "supports.clamp.facets: 'front': must be one of the surfaces .*end, top, bottom"
     with pytest.raises(CaseError, match=words):
         case.build(COMM)
 

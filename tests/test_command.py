@@ -354,7 +354,7 @@ def test_all_that_is_wrong_in_a_case_is_said_and_nothing_else(bar):
 def test_a_case_is_checked_and_nothing_but_a_picture_is_written(bar):
     checked = runner.invoke(app, ["check", "bar.toml"])
     assert checked.exit_code == 0, checked.output
-    assert cells(checked, "groups     far_left")[2:] == ["2", "facets"]
+    assert cells(checked, "groups     far_left")[2:] == ["2", "facets,", "length", "1", "mm"]
     assert sorted(path.name for path in bar.iterdir()) == ["bar-setup.png", "bar.toml"]
     free = runner.invoke(app, ["check", "bar.toml", "--set", "supports.held.direction=x"])
     assert free.exit_code == 1 and "against it: supports: body 'body' can slide along y" in free.stdout
