@@ -322,3 +322,8 @@ def test_refusals():
         Mechanics(b.state, [b.solid(), crack, pair], b.drive(b.lower, [0.0, 0.0]))
     with pytest.raises(ValueError, match="bodies"):
         ContactSurfaces.automatic([])
+    missing = np.array([100_000], dtype=np.int32)
+    with pytest.raises(ValueError, match=r"without: .* out of range"):
+        ContactSurfaces.automatic([b.solid()], without=missing)
+    with pytest.raises(ValueError, match=r"slave_facets: .* out of range"):
+        SurfacePair(b.state, missing, faces[1], young=E)

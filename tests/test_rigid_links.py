@@ -177,6 +177,8 @@ def test_links_that_make_no_sense_are_refused():
     hinge = [beam.point(0.0, HEIGHT / 2)]
     with pytest.raises(ValueError, match="can move along 'rz' while no attached node does"):
         RigidLink(beam.state, hinge, (0.0, HEIGHT / 2), motion={"x": 0.0, "y": 0.0})
+    with pytest.raises(ValueError, match=r"dim = 5 .*0 … 2"):
+        RigidLink(beam.state, [Attachment(np.array([0], dtype=np.int32), dim=5)], (0.0, 1.0))
     with pytest.raises(ValueError, match="motion = 'z'"):
         RigidLink(beam.state, hinge, (0.0, 1.0), motion={"z": 0.0})
     with pytest.raises(ValueError, match="stiffness = 0"):

@@ -344,6 +344,8 @@ def test_rocking_keeps_the_pivot_on_its_way(dim):
         (lambda: ToolPath.slice_push((0, 0), (0, -1), (1, 0), -1.0), "ratio"),
         (lambda: ToolPath.slice_push((0, 0), (0, -1), (0, 0), 1.0), "draw"),
         (lambda: ToolPath.slice_push((0, 0), (0, -1, 0), (1, 0), 1.0), "velocity"),
+        (lambda: ToolPath.slice_push((0, 0), (0, -1), (0, 2), 1.0), "velocity"),
+        (lambda: ToolPath.slice_push((0, 0), (0, 0), (1, 0), 1.0), "velocity"),
         (lambda: ToolPath.rock((0, 0), (0, -1), 4.0, 1.0), "angle"),
         (lambda: ToolPath.rock((0, 0), (0, -1), 0.1, 0.0), "period"),
         (lambda: ToolPath.rock((0, 0), (0, -1), 0.1, 1.0, (1, 2, 3)), "pivot"),

@@ -15,7 +15,7 @@ from cutsim.base.parameters import TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.bodies.loads import Load
 from cutsim.fields.sizes import incidence
-from cutsim.fields.space import locate_dofs, refuse
+from cutsim.fields.space import locate_dofs, marks, refuse
 from cutsim.fields.state import State
 
 # share of a straight edge's load that its nodes take, ends first, by the degree of the displacement
@@ -160,8 +160,7 @@ class LineLoad(NodalLoad):
         mesh = state.mesh
         mesh.topology.create_entities(1)
         ends = incidence(mesh, 1, 0)[: mesh.topology.index_map(1).size_local]
-        marked = np.zeros(mesh.topology.index_map(0).size_local + mesh.topology.index_map(0).num_ghosts, dtype=bool)
-        marked[vertices] = True
+        marked = marks(mesh.comm, mesh.topology.index_map(0), vertices, "vertices")
         edges = np.flatnonzero(marked[ends].all(axis=1)).astype(np.int32)
         found = mesh.comm.allreduce(len(edges))
         require("vertices", found, found > 0, f"vertices with edges of the mesh between them (load {name!r})")

@@ -62,9 +62,11 @@ class Attachment:
         """Owned dofs that follow the link. Collective.
 
         Raises:
-            ValueError: The mesh has no such axis, or no node is found on any rank.
+            ValueError: The mesh has no such axis or entities, or no node is found on any rank.
         """
         gdim, tdim = state.mesh.geometry.dim, state.mesh.topology.dim
+        known = self.dim is None or self.dim <= tdim
+        require("dim", self.dim, known, f"0 … {tdim}, or None for facets")
         axes = "xyz"[:gdim] if self.along is None else self.along
         require("along", self.along, set(axes) <= set("xyz"[:gdim]), f"some of {', '.join('xyz'[:gdim])}")
         if isinstance(self.entities, Surface):

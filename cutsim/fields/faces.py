@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cutsim.base.checks import require
 from cutsim.base.signatures import checked
 from cutsim.fields.sizes import incidence
-from cutsim.fields.space import crack_measure_entities
+from cutsim.fields.space import crack_measure_entities, marks
 
 
 @checked
@@ -44,12 +44,13 @@ class Face:
             name: Name of the parameter as the user wrote it.
 
         Raises:
-            ValueError: Some of them are not on the outer boundary.
+            ValueError: Some of them are not on the outer boundary, or no facets of the mesh.
         """
         tdim = mesh.topology.dim
         mesh.topology.create_connectivity(tdim - 1, tdim)
         to_cells = mesh.topology.connectivity(tdim - 1, tdim)
         facets = np.unique(np.asarray(facets, dtype=np.int32))
+        marks(mesh.comm, mesh.topology.index_map(tdim - 1), facets, name)  # all within the mesh
         owned = facets < mesh.topology.index_map(tdim - 1).size_local
         inner = mesh.comm.allreduce(int(np.count_nonzero(np.diff(to_cells.offsets)[facets[owned]] != 1)))
         require(

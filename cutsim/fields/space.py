@@ -155,7 +155,7 @@ def locate_dofs(V: fem.FunctionSpace, dim: int, entities: NDArray[np.int32]) -> 
     topology, dofmap = V.mesh.topology, V.dofmap
     topology.create_entities(dim)
     cell_entities = incidence(V.mesh, topology.dim, dim)
-    named = _marks(V.mesh.comm, topology.index_map(dim), np.asarray(entities, dtype=np.int32), "entities")
+    named = marks(V.mesh.comm, topology.index_map(dim), np.asarray(entities, dtype=np.int32), "entities")
     cells, local = np.nonzero(named[cell_entities])
     closure = np.array([dofmap.dof_layout.entity_closure_dofs(dim, i) for i in range(cell_entities.shape[1])])
     found = np.zeros(dofmap.index_map.size_local + dofmap.index_map.num_ghosts, dtype=np.int32)
@@ -211,8 +211,12 @@ def _cell_facets(mesh: Mesh) -> NDArray[np.int32]:
     return incidence(mesh, tdim, tdim - 1)
 
 
-def _marks(comm: MPI.Comm, index_map: IndexMap, indices: NDArray[np.int32], name: str) -> NDArray[np.bool_]:
-    """Whether any rank names the index, for all local indices."""
+def marks(comm: MPI.Comm, index_map: IndexMap, indices: NDArray[np.int32], name: str) -> NDArray[np.bool_]:
+    """Whether any rank names the index, for all local indices. Collective.
+
+    Raises:
+        ValueError: On all ranks, if an index is out of range; the message begins with the name.
+    """
     size = index_map.size_local + index_map.num_ghosts
     bad = indices[(indices < 0) | (indices >= size)]
     text = f"{name}: {bad.size} indices out of range, e.g. {bad[:1]}; allowed are 0 to {size - 1}"
@@ -227,7 +231,7 @@ def _crack_marks(mesh: Mesh, facets: Facets) -> NDArray[np.bool_]:
     comm, index_map = mesh.comm, _facet_map(mesh)
     parts = [facets] if isinstance(facets, np.ndarray) else list(facets)
     given = np.concatenate([np.empty(0, np.int32), *(np.asarray(p, dtype=np.int32).ravel() for p in parts)])
-    cracked = _marks(comm, index_map, given, "facets")
+    cracked = marks(comm, index_map, given, "facets")
     if comm.allreduce(int(cracked.sum())) == 0:
         raise ValueError("facets: 0 on all ranks; allowed is at least 1 interior facet")
 
@@ -270,7 +274,7 @@ def _cells_of(mesh: Mesh, facets: NDArray[Any]) -> tuple[NDArray[np.int32], NDAr
 
 def _in_region(mesh: Mesh, facets: NDArray[Any], cells: NDArray[Any], plus: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Whether the first cell of each facet is the one in the region."""
-    inside = _marks(mesh.comm, mesh.topology.index_map(mesh.topology.dim), plus.ravel(), "plus")[cells]
+    inside = marks(mesh.comm, mesh.topology.index_map(mesh.topology.dim), plus.ravel(), "plus")[cells]
     wrong = facets[inside[:, 0] == inside[:, 1]].astype(np.int32)
     text = "plus: {} facets have both cells or neither in the '+' region, e.g. at {}; allowed is exactly one"
     _refuse_facets(mesh, wrong, text)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import ufl
 
-from cutsim.base.checks import positive, require_number
+from cutsim.base.checks import positive, require, require_number
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import with_constants
@@ -31,7 +31,7 @@ class ViscousBond:
         viscosity: η > 0 [stress·time/length].
 
     Raises:
-        ValueError: The viscosity is not positive.
+        ValueError: The viscosity is not positive, or the law has one already.
     """
 
     law: CohesiveLaw
@@ -39,6 +39,7 @@ class ViscousBond:
 
     def __post_init__(self) -> None:
         require_number("viscosity", self.viscosity, positive)
+        require("law", self.law, not isinstance(self.law, ViscousBond), "a law without a viscosity of its own")
 
     @property
     def strength(self) -> float:

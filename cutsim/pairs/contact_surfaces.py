@@ -13,7 +13,7 @@ from cutsim.base.signatures import checked
 from cutsim.base.units import Stress
 from cutsim.bodies.solid import Solid
 from cutsim.fields.faces import Face
-from cutsim.fields.space import CRACKED, sum_over_ranks
+from cutsim.fields.space import CRACKED, marks, sum_over_ranks
 from cutsim.fields.state import State
 from cutsim.pairs.surface_pair import SurfacePair
 
@@ -45,10 +45,10 @@ class ContactSurfaces:
         Args:
             bodies: The bodies; the same state belongs to all.
             without: Local facets that are left out, such as those of a crack whose faces press on each other
-                themselves (`Crack` with closing=True); ghosts included.
+                themselves (`Crack` with closing=True).
 
         Raises:
-            ValueError: There is no body, or bodies have different states.
+            ValueError: There is no body, bodies have different states, or what is left out is no facet of the mesh.
         """
         require("bodies", bodies, len(bodies) > 0, "at least one body")
         state, mesh = bodies[0].state, bodies[0].state.mesh
@@ -59,8 +59,8 @@ class ContactSurfaces:
         outer = np.zeros(facet_map.size_local + facet_map.num_ghosts, dtype=np.int32)
         outer[exterior_facet_indices(mesh.topology)] = 1
         cracked = vars(state.V).get(CRACKED, np.zeros(len(outer), dtype=bool)).copy()
-        left = np.ones(len(outer), dtype=bool)
-        left[[] if without is None else without] = False
+        named = np.empty(0, dtype=np.int32) if without is None else np.asarray(without, dtype=np.int32)
+        left = ~marks(mesh.comm, facet_map, named, "without")
         filled = np.zeros(cell_map.size_local + cell_map.num_ghosts, dtype=np.int32)
         for body in bodies:
             filled[slice(None) if body.cells is None else body.cells] = 1

@@ -92,7 +92,9 @@ def extract(gdim: int) -> MeshData:
             'Physical Surface("body") = {1}; and end the last line of the file'
         )
     if top != gdim:
-        raise ValueError(f"gdim = {gdim}, but the highest dimension of a physical group is {top}")
+        raise ValueError(
+            f"gdim = {gdim}, but the highest dimension of a physical group is {top}; in a case file gdim is dim"
+        )
     tags, x, _ = gmsh.model.mesh.getNodes()
     numbers, first = np.unique(tags.astype(np.int64), return_index=True)
     nodes = Numbering(numbers, "node")

@@ -295,17 +295,20 @@ class ToolPath:
 
         Args:
             start: Position at time zero [length].
-            velocity: Velocity v of the push [length/time].
+            velocity: Velocity v of the push, not along the edge [length/time].
             draw: Direction of the slice, that of the edge.
             ratio: Slice–push ratio ξ ≥ 0, the speed along the edge over that of the push: the tangent of the angle
                 between push and motion (Atkins, Xu, Jeronimidis 2004) [–].
 
         Raises:
-            ValueError: A number is outside its range, a direction is zero, or vectors have different lengths.
+            ValueError: A number is outside its range, a direction is zero, both are the same, or vectors have different
+                lengths.
         """
         require_number("ratio", ratio, nonnegative)
         x, v, e = _vectors(start=start, velocity=velocity, draw=draw)
-        e = np.asarray(unit_vector("draw", tuple(e)))
+        e = np.asarray(unit_vector("draw", tuple(e.tolist())))
+        across = float(np.linalg.norm(v - (v @ e) * e))
+        require("velocity", v.tolist(), across > 1e-9 * np.linalg.norm(v), "not zero and not along draw")
         rate = v + ratio * np.linalg.norm(v) * e
         return cls(lambda s: x + rate * s)
 
