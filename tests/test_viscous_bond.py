@@ -139,3 +139,8 @@ def test_what_a_snap_sets_free_is_viscous_work():
     assert rows["energy_cohesive_viscous"][-1] == pytest.approx(free, rel=0.05)
     assert np.abs(rows["energy_closure"]).max() < 0.02
     assert "the viscosity takes" in "; ".join(b.state.verdict.reasons)
+
+
+def test_a_law_has_one_viscosity():
+    with pytest.raises(ValueError, match=r"law = .* without a viscosity"):
+        ViscousBond(ViscousBond(EXPONENTIAL, 1.0), 1.0)
