@@ -8,6 +8,7 @@ from dolfinx import mesh
 from mpi4py import MPI
 
 from cutsim import (
+    Attachment,
     Bilinear,
     Crack,
     Exponential,
@@ -15,6 +16,7 @@ from cutsim import (
     Mechanics,
     PathFollowing,
     PenaltyContact,
+    RigidLink,
     Solid,
     State,
     StepControl,
@@ -51,7 +53,9 @@ class Bar:
     mechanics: Mechanics
 
     @classmethod
-    def build(cls, law=BONDS["exponential"], *, pulled=False, viscosity=0.0, corners=(), comm=MPI.COMM_WORLD):
+    def build(
+        cls, law=BONDS["exponential"], *, pulled=False, linked=False, viscosity=0.0, corners=(), comm=MPI.COMM_WORLD
+    ):
         b = narrow(comm)
         crack = b.crack(law, young=SOFT, normal="reference")
         terms = [b.solid(LinearElastic(SOFT, 0.0), viscosity=viscosity), crack]
@@ -59,6 +63,9 @@ class Bar:
         top = b.face(1, 1.0)
         if pulled:
             terms.append(Traction(b.state, top, (0.0, 1.0), lambda t: t, name="pull"))
+        elif linked:
+            motion = {"x": 0.0, "y": lambda t: t, "rz": 0.0}
+            terms.append(RigidLink(b.state, [Attachment(top, "y")], (0.0, 1.0), motion=motion))
         else:
             supports.append(Support(b.state, top, 1, lambda t: t, name="top", corners=corners))
         return cls(b, crack, Mechanics(b.state, terms, supports))
@@ -112,6 +119,13 @@ def test_a_stiff_bond_in_a_soft_bar_snaps_back(law):
     assert audit.entries["viscous"] == 0
     assert bar.state.path == pytest.approx(np.abs(np.diff(time, prepend=0)).sum())
     assert max(r.lost for r in reports) < 1.1 * FINE.facets * bar.mechanics.path.unit
+
+
+def test_a_path_on_which_a_rigid_link_moves_the_bar():
+    """Time may stand still within a step, in which the link has no rate."""
+    time, opening, T, _ = Bar.build(linked=True).run(1.2)
+    np.testing.assert_allclose(time, T / SOFT + opening, atol=1e-6)
+    assert np.count_nonzero(np.diff(time) < 0) > 5 and T[-1] < 1e-3
 
 
 @pytest.mark.parametrize("law", BONDS.values(), ids=BONDS)

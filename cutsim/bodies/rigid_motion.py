@@ -171,6 +171,9 @@ class RigidMotion:
     def _rates(self) -> tuple[Array, Array]:
         """Velocity and acceleration at the end of the step."""
         s, dt, old, values = self.scheme, self._dt, self._motion.committed, self.values
+        if not self.rate_dependent:  # along an equilibrium path time may stand still
+            none = np.zeros_like(values)
+            return (values - old.values) / dt if dt else none, none
         inert = self._m > 0
         known = old.values + dt * old.velocity + (0.5 - s.beta) * dt**2 * old.acceleration
         a = np.where(inert, (values - known) / (s.beta * dt**2), 0.0)
@@ -194,6 +197,8 @@ class RigidMotion:
 
     def stiffness(self) -> Array:
         """Derivative of each equation by its coordinate, without that of the deformable body [force/length]."""
+        if not self.rate_dependent:
+            return self._k
         s, dt, inert = self.scheme, self._dt, self._m > 0
         inertia = (1 - s.alpha_m) / (1 - s.alpha_f) * self._m / (s.beta * dt**2)
         return self._k + self._d * np.where(inert, s.gamma / (s.beta * dt), 1 / dt) + inertia
