@@ -25,6 +25,7 @@ from cutsim import (
     run,
 )
 from cutsim.studies.body import Faces
+from cutsim.studies.fixture import STANDING
 from cutsim.studies.insertion_heat import Conductor, ThermalCut, heated
 from helpers.fields import rotation
 
@@ -139,19 +140,20 @@ def test_layers_of_one_material_are_one_body(everything):
         np.testing.assert_allclose(apart["heat_friction"][-1], apart["energy_friction"][-1], rtol=1e-8)
 
 
-def split(notch=NOTCH, **options):
+@cache
+def split(notch=NOTCH, length=0.8, fixture=STANDING, **options):
     """A strip of one material, its sides free, that a blade splits: insertion and history."""
-    size = {"dim": 2, "Lx": 0.8, "H": 2.0, "lc": 0.1, "band": 0.3, "growth": 1.6, "notch": notch}
+    size = {"dim": 2, "Lx": length, "H": 2.0, "lc": 0.1, "band": 0.3, "growth": 1.6, "notch": notch}
     body = cracked_block(
         read_geo(MESHES / "block.geo", MPI.COMM_WORLD, size, gdim=2), RUBBER, BOND, viscosity=0.005, **options
     )
-    cut = Insertion.build(body, Blade(0.35, 0.1, 0.3), Drive(1.0), notch=notch)
+    cut = Insertion.build(body, Blade(0.35, 0.1, 0.3), Drive(1.0), notch=notch, fixture=fixture)
     return cut, drive(cut, cut.time_of(0.7), 0.05)
 
 
 def test_any_degree_and_formulation():
     """Elements of degree 2 with a pressure of their own: nearly the same force, on a coarse mesh."""
-    (_, plain), (cut, fine) = split(), split(degree=2, solid={"volumetric": "taylor-hood"})
+    (_, plain), (cut, fine) = split(), split.__wrapped__(degree=2, solid={"volumetric": "taylor-hood"})
     assert fine["force"][-1] == pytest.approx(plain["force"][-1], rel=0.05)
     assert "block_pressure" in cut.mechanics.fields and np.abs(fine["energy_closure"]).max() < 0.01
 
@@ -177,3 +179,40 @@ def test_a_body_without_a_notch_is_entered_at_its_surface():
     assert above.any() and not rows["force"][above].any() and rows["depth"][above].max() == pytest.approx(0.0)
     assert np.diff(rows["force"][~above][:5]).min() > 0, "it dents the body"
     assert rows["front"][-1] > 0.2 and rows["imbalance"].max() < 1e-6
+
+
+# -- the plate --------------------------------------------------------------------------------------------------------
+
+
+def test_a_smooth_plate_is_a_smooth_support():
+    """A body that rests on it begins at zero gap, with nothing but the plate to hold it; the plate bears the blade."""
+    (_, held), (cut, resting) = split(), split(fixture=Fixture(resting=True))
+    assert resting["force"][-1] > 0.05
+    np.testing.assert_allclose(resting["force"], held["force"], rtol=0.01, atol=1e-3 * held["force"][-1])
+    assert resting["imbalance"].max() < 1e-6 and np.abs(resting["energy_closure"]).max() < 0.01
+    assert cut.reaction() == pytest.approx(resting["force"][-1])
+    np.testing.assert_allclose(resting["plate_force_y"], -resting["force"], rtol=1e-6)
+
+
+def test_a_long_body_lifts_off_the_plate_at_its_ends():
+    """No tension there but that of the springs, less than a hundredth of the force; the support draws it down."""
+    cut, rows = split(length=8.0, fixture=Fixture(resting=True))
+    x, u = (values[:, :2] for values in (cut.state.V.tabulate_dof_coordinates(), cut.state.u.x.array.reshape(-1, 2)))
+    floor = np.isclose(x[:, 1], -2.0)
+    ends, middle = floor & (np.abs(x[:, 0]) > 7.9), floor & (np.abs(x[:, 0]) < 1.0)
+    assert u[ends, 1].min() > 0.01 and u[middle, 1].max() < 0
+    patch = cut.plate.patches[0]
+    assert patch.surface.points.integral(patch.pressure()) == pytest.approx(rows["force"][-1], rel=0.01)
+    assert patch.surface.points.area_above(-patch.contact()["depth"], 0.0) > 2.0, "much of it is in the air"
+    np.testing.assert_allclose(rows["force"][-1], split(length=8.0)[1]["force"][-1], rtol=0.01)
+
+
+def test_the_plate_rubs():
+    """It holds the halves that the blade drives apart, within the cone of Coulomb, with work of its own."""
+    _, rows = split(length=3.0, fixture=Fixture(resting=True, friction=0.3))
+    assert rows["force"][10] > 1.03 * split(length=3.0)[1]["force"][10]
+    assert rows["energy_friction"][-1] > 0 and np.abs(rows["energy_closure"]).max() < 0.01
+    assert np.all(rows["plate_sticking"] + rows["plate_slipping"] <= 6.0 + 1e-9)
+    assert rows["imbalance"].max() < 1e-6
+    with pytest.raises(ValueError, match=r"friction = 0\.3.*resting"):
+        Fixture(friction=0.3)

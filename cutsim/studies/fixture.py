@@ -14,8 +14,10 @@ from cutsim.base.parameters import TimeFunction
 from cutsim.base.signatures import checked
 from cutsim.base.units import Length
 from cutsim.bodies.loads import Support
+from cutsim.interface.rubbing import AnyFriction, check_friction
 from cutsim.studies.body import CrackedBody
 from cutsim.studies.frame import FLAT, Array, Facets, Frame
+from cutsim.studies.plate import RestingPlate
 
 
 @checked
@@ -23,13 +25,16 @@ from cutsim.studies.frame import FLAT, Array, Facets, Frame
 class Fixture:
     """Fixture: names of the groups of a mesh where the tool enters and where the body is held.
 
-    The body rests on a smooth plate. Where its ends are free it is also held across the crack plane along the line in
-    which that meets the plate; in space, without plane of symmetry or walls, also along this line, in its middle. A
-    body that is held at its ends may be cut through.
+    The body lies on a smooth plate that holds it from below, against a push and a pull; or it rests on it in contact,
+    may slide with friction and lift off, see `RestingPlate`. Where its ends are free it is also held across the crack
+    plane along the line in which that meets the plate; in space, without plane of symmetry or walls, also along this
+    line, in its middle. A body that is held at its ends may be cut through.
 
     Args:
         top: Facets of the surface beside the '−' and the '+' face of the crack.
         plate: Facets on the plate, on the far side of the body.
+        resting: Whether the body rests on the plate and may lift off; if not, the plate holds it.
+        friction: Friction of a resting body on the plate, a law, or the coefficient of Coulomb's; None for none.
         symmetry: Facets in the plane of symmetry that halves body and tool; used if the mesh has this group.
         walls: Facets that are held along the edge of the tool: a body between two of them is in plane strain.
         ends: Facets at the far ends, one group on either side of the crack plane, which are held along its normal; they
@@ -38,11 +43,13 @@ class Fixture:
         thread: Cells of the thread in a body of revolution, which stays on the axis.
 
     Raises:
-        ValueError: Ends are to be drawn and there are none.
+        ValueError: Ends are to be drawn and there are none, or a body that does not rest on the plate is to rub on it.
     """
 
     top: tuple[str, str] = ("top_left", "top_right")
     plate: str = "bottom"
+    resting: bool = False
+    friction: AnyFriction = None
     symmetry: str = "symmetry"
     walls: tuple[str, ...] = ()
     ends: tuple[str, ...] = ()
@@ -52,6 +59,8 @@ class Fixture:
     def __post_init__(self) -> None:
         require_number("drawn", self.drawn, finite)
         require("drawn", self.drawn, not self.drawn or len(self.ends) > 0, "0 for a body with free ends")
+        check_friction("friction", self.friction)
+        require("friction", self.friction, self.resting or self.friction is None, "None unless resting = True")
         require("top", self.top, len(self.top) == 2, "the groups beside the '−' and the '+' face")
 
     def check(self, body: CrackedBody) -> None:
@@ -72,9 +81,12 @@ class Fixture:
         """Whether the mesh is that of a half, with a plane of symmetry."""
         return self.symmetry in body.domain.names
 
-    def support(self, body: CrackedBody, frame: Frame) -> Support:
-        """The plate; its reaction acts against the push."""
-        return _held(body, body.domain.facets(self.plate), -frame.push, name="plate")
+    def support(self, body: CrackedBody, frame: Frame) -> Support | RestingPlate:
+        """The plate; its force on the body acts against the push. Collective."""
+        facets = body.domain.facets(self.plate)
+        if self.resting:
+            return RestingPlate(body, facets, frame, self.friction)
+        return _held(body, facets, -frame.push, name="plate")
 
     def supports(self, body: CrackedBody, frame: Frame, entry_time: float) -> list[Support]:
         """All that holds the body beside the plate. Collective."""

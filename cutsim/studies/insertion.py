@@ -23,6 +23,7 @@ from cutsim.studies.cut_area import CutArea
 from cutsim.studies.drive import Drive, Motion
 from cutsim.studies.fixture import STANDING, Fixture
 from cutsim.studies.frame import Frame
+from cutsim.studies.plate import RestingPlate
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.tool_contact import ToolContact, doubt_units
 from cutsim.tools.tool_parts import PARTS, ToolParts
@@ -49,7 +50,7 @@ class Insertion:
             of revolution. Where layers are soft, so is the contact.
         parts: Force and friction work of its tip and its shaft.
         areas: How far each part of the crack has been cut.
-        plate: Support under the body.
+        plate: What is under the body: a support, or a plate on which it rests.
         mechanics: The problem to run.
         symmetry_factor: Factor from what is meshed to the whole body, 2 with a plane of symmetry.
     """
@@ -61,7 +62,7 @@ class Insertion:
     contacts: tuple[ToolContact, ...]
     parts: ToolParts
     areas: tuple[CutArea, ...]
-    plate: Support
+    plate: Support | RestingPlate
     mechanics: Mechanics
     symmetry_factor: float
 
@@ -101,10 +102,11 @@ class Insertion:
         doubt_units(body.state.verdict, _kind(tool), tool, frame.height)
         contacts = _contacts(body, tool, frame, motion, fixture.top, friction)
         parts, plate = ToolParts(contacts, tool), fixture.support(body, frame)
+        resting, held = ([], [plate]) if isinstance(plate, Support) else ([plate], [])
         problem = Mechanics(
             body.state,
-            [*body.terms, *contacts],
-            [plate, *fixture.supports(body, frame, motion.entry_time)],
+            [*body.terms, *contacts, *resting],
+            [*held, *fixture.supports(body, frame, motion.entry_time)],
             observers=[parts],
             **(mechanics or {}),
         )
@@ -129,6 +131,12 @@ class Insertion:
         """
         return self.motion.time_of(depth, push)
 
+    def reaction(self) -> float:
+        """Force of the plate on what is meshed of the body, against the push [force]."""
+        if isinstance(self.plate, Support):
+            return self.mechanics.reaction(self.plate)
+        return float(self.plate.force() @ self.frame.push)
+
     def columns(self, columns: Columns) -> Columns:
         """Depth of the tip, force of the whole tool, its imbalance with the plate, areas; tip and shaft. Collective.
 
@@ -139,7 +147,7 @@ class Insertion:
         """
         factor, kind = self.symmetry_factor, self.state.facet_measure
         force = -factor * float(sum(contact.force() for contact in self.contacts) @ self.frame.push)
-        reaction = factor * self.mechanics.reaction(self.plate)
+        reaction = factor * self.reaction()
         rows: Columns = {
             "depth": (self.depth, "length"),
             "force": (force, "force"),
