@@ -99,6 +99,7 @@ from .studies.layered import Layer as Layer
 from .studies.layered import LayeredBlock as LayeredBlock
 from .studies.mesh_rule import MeshRule as MeshRule
 from .studies.picture import draw_insertion as draw_insertion
+from .tools.carriage import Carriage as Carriage
 from .tools.needle_tips import BevelNeedle as BevelNeedle
 from .tools.needle_tips import HollowNeedle as HollowNeedle
 from .tools.pointed import Blade as Blade

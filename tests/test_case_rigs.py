@@ -81,13 +81,13 @@ def test_links_of_a_case(written):
     arm = 2 + rows["lever_x"][-1]
     assert rows["grip_rz_moment"][-1] - 3 * rows["lever_rz"][-1] == pytest.approx(0.5 * arm, rel=1e-5)
     motion = simulation.problem.terms[-1].border.motion
-    assert [m.mass for m in motion._machines] == pytest.approx([0, 0, 2e-7])
+    assert motion._machines.mass == pytest.approx([0, 0, 2e-7])
 
 
 def test_machine_of_a_tool(written):
     simulation = written(PUSH).build(COMM)
     tool = next(iter(simulation.parts.tools["tool"]))
-    coordinate = tool.border.motion.coordinates[0]
+    coordinate = tool.carriage.axes.motion.coordinates[0]
     assert coordinate.machine == Machine("-x", stiffness=20.0, damping=2.0, weight=0.1)
     rows = history(simulation.problem, 1.0, StepControl.fixed(0.5))
     lag = 0.01 * rows["time"] - rows["tool_drive_x"]

@@ -241,17 +241,18 @@ def test_rejected_step_leaves_no_trace():
     """After a step that was solved and given up all is as it was, bit for bit."""
     problem = falling(0.5, 0.05, 0.3).mechanics()
     run(problem, 0.1, StepControl.fixed(0.05))
-    before, place = save(problem), problem.terms[1].position.value.copy()
+    tool = problem.terms[1]
+    before, place = save(problem), tool.position.value.copy()
     begin(problem, 0.2)
     assert problem.solve().converged
     problem.evaluate()
-    assert np.abs(problem.terms[1].position.value - place).max() > 0.01
+    assert np.abs(tool.position.value - place).max() > 0.01
     problem.state.rollback()
     after = save(problem)
     for snapshot in (before, after):
         del snapshot.values["mechanics: solver"]  # the scale of forces, which a rejected step may pass on
     assert after == before
-    assert np.array_equal(problem.terms[1].position.value, place)
+    assert np.array_equal(tool.position.value, place)
 
 
 def test_incompressible_block_under_a_driven_ball():
@@ -276,7 +277,7 @@ def test_incompressible_block_under_a_driven_ball():
 
 
 def test_tool_that_nothing_holds_is_refused():
-    with pytest.raises(ValueError, match=r"tool is free along '-y'.*Give its machine a stiffness"):
+    with pytest.raises(ValueError, match=r"tool_drive is free along '-y'.*Give its machine a stiffness"):
         Block(down(0.1), [Machine("-y", weight=1.0)]).run()
     with pytest.raises(ValueError, match=r"machines\[1\].axis"):
         Block(down(0.1), [Machine("-y", 1.0), Machine((1.0, 1.0), 1.0)])

@@ -425,8 +425,13 @@ P = TypeVar("P")
 
 
 def with_companions(terms: Iterable[Term]) -> list[Term]:
-    """Terms, each with those that come with it."""
-    return [part for term in terms for part in (term, *term.companions)]
+    """Terms, each with those that come with it; what comes with several of them is there once."""
+    given = list(terms)
+    found, known = list[Term](), {id(term) for term in given}
+    for term in given:
+        found += [term, *(part for part in term.companions if id(part) not in known)]
+        known.update(id(part) for part in term.companions)
+    return found
 
 
 def offering(parts: Iterable[Any], what: type[P]) -> list[P]:

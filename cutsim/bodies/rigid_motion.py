@@ -4,7 +4,8 @@ A coordinate s has the equation, at the end of a step and divided by 1 − α_f 
 
     d ṡ + k (s − s_machine) − F − Q + c m s̈(s) + h = 0,
 
-with Q the force of the deformable body along it.  Without mass ṡ = Δs/Δt.
+with Q the force of the deformable body along it.  Without mass ṡ = Δs/Δt.  Until they are released the coordinates are
+clamped to their paths, s = s_machine: then the machines take over.
 """
 
 from collections.abc import Sequence
@@ -55,14 +56,62 @@ class _Motion:
     reaction: Array  # force of the deformable body, Q
     balance: Array  # what is left of the equation at the end of a step, with inertia
     started: bool = False
+    clamped: bool = False
     viscous: float = 0.0
     numerical: float = 0.0
     work: float = 0.0  # of the machines and what is prescribed, in the step
+    blow: float = 0.0  # energy with which masses that were clamped before begin the step
 
     @classmethod
     def at_rest(cls, values: Array, velocity: Array) -> Self:
         none = np.zeros_like(values)
         return cls(values, velocity, none, values, none, none, none)
+
+
+class _Machines:
+    """Machines of some coordinates, of which those that have none take part in nothing.
+
+    Args:
+        coordinates: The coordinates.
+
+    Attributes:
+        stiffness: k of each.
+        damping: d of each.
+        mass: m of each.
+        velocity: Initial velocity of each.
+        corners: Times at which a force has a kink.
+    """
+
+    def __init__(self, coordinates: Sequence[Coordinate]) -> None:
+        self._coordinates, self._each = coordinates, [c.machine or Machine("x") for c in coordinates]
+        numbers = [(m.stiffness, m.damping, m.mass, m.velocity) for m in self._each]
+        self.stiffness, self.damping, self.mass, self.velocity = np.array(numbers).T
+        self.corners = {t for m in self._each for t in m.corners}
+
+    def paths(self, time: float) -> Array:
+        """What is prescribed at a time."""
+        return np.array([c.path(time) for c in self._coordinates], dtype=float)
+
+    def forces(self, time: float) -> Array:
+        """Forces with weights at a time."""
+        return np.array([m.weight + m.force_at(time) for m in self._each])
+
+    def started(self, old: _Motion, time: float, reaction: Array) -> _Motion:
+        """The motion at the time when the machines begin to act.
+
+        Args:
+            old: The motion as it was before.
+            time: The time.
+            reaction: Force of the deformable body [force].
+        """
+        path, force, inert = self.paths(time), self.forces(time), self.mass > 0
+        velocity = np.where(inert, self.velocity, old.velocity)
+        static = self.damping * velocity + self.stiffness * (old.values - path) - force - reaction
+        acceleration = np.where(inert, -static / np.where(inert, self.mass, 1.0), 0.0)
+        balance = static + self.mass * acceleration
+        blow = 0.5 * float(self.mass @ velocity**2) if old.clamped else 0.0
+        now = replace(old, path=path, force=force, reaction=reaction, started=True, clamped=False, blow=blow)
+        return replace(now, velocity=velocity, acceleration=acceleration, balance=balance)
 
 
 class RigidMotion:
@@ -73,6 +122,7 @@ class RigidMotion:
         name: Name of the body.
         coordinates: The coordinates.
         dt: Size of the step.
+        release: Time until which all of them are clamped to their paths, 0 for never [time].
 
     Attributes:
         coordinates: As above.
@@ -83,20 +133,21 @@ class RigidMotion:
 
     scheme: Scheme = TRAPEZOIDAL
 
-    def __init__(self, memory: Memory, name: str, coordinates: Sequence[Coordinate], dt: fem.Constant) -> None:
-        self.coordinates, self._dt_constant = tuple(coordinates), dt
+    def __init__(
+        self, memory: Memory, name: str, coordinates: Sequence[Coordinate], dt: fem.Constant, release: float = 0.0
+    ) -> None:
+        self.coordinates, self._dt_constant, self._release = tuple(coordinates), dt, release
         self.held = np.array([c.machine is None for c in coordinates])
         self.units = np.array([c.unit for c in coordinates])
-        machines = [c.machine or Machine("x") for c in coordinates]
-        self._k, self._d, self._m = np.array([(m.stiffness, m.damping, m.mass) for m in machines]).T
-        self._machines = machines
-        velocity = np.array([m.velocity for m in machines])
-        self._motion = memory.value(f"{name}: motion", _Motion.at_rest(self._paths(0.0), velocity))
+        self._machines = machines = _Machines(self.coordinates)
+        self._k, self._d, self._m = machines.stiffness, machines.damping, machines.mass
+        rest = _Motion.at_rest(machines.paths(0.0), (release <= 0) * machines.velocity)
+        self._motion = memory.value(f"{name}: motion", replace(rest, clamped=release > 0))
 
     @property
     def corners(self) -> tuple[float, ...]:
-        """Times at which a force of a machine has a kink."""
-        return tuple(sorted({t for m in self._machines for t in m.corners}))
+        """Times at which a force of a machine has a kink, and that of the release."""
+        return tuple(sorted(self._machines.corners | ({self._release} if self._release > 0 else set())))
 
     @property
     def rate_dependent(self) -> bool:
@@ -125,48 +176,41 @@ class RigidMotion:
     def ahead(self, fraction: float, time: float) -> Array:
         """What each coordinate is ahead of its path after a fraction of the step, which is a time."""
         old, now = self._motion.committed.values, self._motion.trial.values
-        return np.asarray(old + fraction * (now - old) - self._paths(time))
+        return np.asarray(old + fraction * (now - old) - self._machines.paths(time))
 
     @property
     def started(self) -> bool:
-        """Whether a step has begun."""
+        """Whether a step has begun in which the coordinates are not clamped."""
         return self._motion.committed.started
 
-    def _paths(self, time: float) -> Array:
-        return np.array([c.path(time) for c in self.coordinates], dtype=float)
-
-    def _forces(self, time: float) -> Array:
-        return np.array([m.weight + m.force_at(time) for m in self._machines])
+    @property
+    def clamped(self) -> bool:
+        """Whether the coordinates follow their paths at the end of the step."""
+        return self._motion.trial.clamped
 
     # -- steps ----------------------------------------------------------------------------------------------------
 
     def begin(self, start: float, end: float, reaction: Array) -> None:
-        """Prescribe what acts at the end of a step, and keep the coordinates as they are.
+        """Prescribe what acts at the end of a step, and keep the coordinates as they are unless they are clamped.
 
         Args:
             start: Time at the start of the step.
             end: Time at its end.
             reaction: Force of the deformable body at the start, which the first step needs.
         """
+        path = self._machines.paths(end)
+        if end <= self._release:
+            self._motion.trial = replace(self._motion.committed, values=path, path=path)
+            return
         if not self._motion.committed.started:
-            self._motion.set(self._at_start(self._motion.committed, start, reaction))
-        old = self._motion.committed
-        self._motion.trial = replace(old, path=self._paths(end), force=self._forces(end))
-
-    def _at_start(self, old: _Motion, time: float, reaction: Array) -> _Motion:
-        path, force = self._paths(time), self._forces(time)
-        static = self._d * old.velocity + self._k * (old.values - path) - force - reaction
-        inert = self._m > 0
-        acceleration = np.where(inert, -static / np.where(inert, self._m, 1.0), 0.0)
-        balance = static + self._m * acceleration
-        return replace(
-            old, path=path, force=force, acceleration=acceleration, reaction=reaction, balance=balance, started=True
-        )
+            self._motion.set(self._machines.started(self._motion.committed, start, reaction))
+        self._motion.trial = replace(self._motion.committed, path=path, force=self._machines.forces(end))
 
     def predict(self) -> None:
-        """Go on at the rate of the last step."""
+        """Go on at the rate of the last step, where they are not clamped."""
         old = self._motion.committed
-        self.assign(old.values + self._dt * old.velocity)
+        if not self.clamped:
+            self.assign(old.values + self._dt * old.velocity)
 
     def _rates(self) -> tuple[Array, Array]:
         """Velocity and acceleration at the end of the step."""
@@ -212,6 +256,12 @@ class RigidMotion:
     def settle(self, reaction: Array) -> None:
         """Take note of the force of the deformable body at the end of the step."""
         old, now = self._motion.committed, self._motion.trial
+        if now.clamped:
+            way = now.values - old.values
+            work = float(-_mean(old.reaction, reaction) @ way)
+            velocity = np.where(self._m > 0, 0.0, way / self._dt)
+            self._motion.trial = replace(now, velocity=velocity, reaction=reaction, work=work)
+            return
         velocity, acceleration = self._rates()
         balance = np.where(self.held, 0.0, self._static(reaction) + self._m * acceleration)
         way, far = now.values - old.values, now.path - old.path
@@ -227,7 +277,8 @@ class RigidMotion:
             balance=balance,
             viscous=old.viscous + float(self._d * _mean(old.velocity, velocity) @ way),
             numerical=old.numerical + taken,
-            work=float(work),
+            work=float(work) + old.blow,
+            blow=0.0,
         )
 
     def _numerical(self, old: _Motion, acceleration: Array, velocity: Array, way: Array) -> float:

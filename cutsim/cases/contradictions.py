@@ -51,6 +51,9 @@ def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
         yield from (((*key, "machines", i, "axis"), machine.axis) for i, machine in enumerate(tool.machines))
         for part in getattr(type(tool.made), "directions", ()):
             yield (*key, part), getattr(tool, part)
+    insertion = valid.get("insertion")
+    if insertion is not None and insertion.machine is not None:
+        yield ("insertion", "machine", "axis"), insertion.machine.axis
     for name, link in valid.get("links", {}).items():
         yield ("links", name, "reference"), link.reference
         for part, place in link.attachments.items():
@@ -123,6 +126,9 @@ def _insertion(valid: Mapping[str, Any]) -> Iterator[Problem]:
         yield ("insertion", "tool"), "must be the name of a tool, such as that of [tool]", insertion.tool
     elif not tool.pointed:
         yield ("insertion", "tool"), "must be a blade or a needle", insertion.tool
+    if insertion.depth is not None and insertion.machine is not None and not insertion.machine.stiffness:
+        words = "not allowed with a machine without stiffness, which goes where it can: give until in [analysis]"
+        yield ("insertion", "depth"), words, insertion.depth
 
 
 def _end(valid: Mapping[str, Any]) -> Iterator[Problem]:
@@ -159,7 +165,7 @@ def _tools(valid: Mapping[str, Any]) -> Iterator[Problem]:
             if moved or tool.rotation is not None or tool.surfaces:
                 yield ("tools", name), "must have no surfaces and no motion: [insertion] gives them", None
             if tool.machines:
-                yield ("tools", name, "machines"), "not allowed: [insertion] moves the tool", None
+                yield ("tools", name, "machines"), "not allowed: give [insertion] a machine, which moves the tool", None
             continue
         if not tool.surfaces:
             yield ("tools", name, "surfaces"), "missing, must be given: what the tool can touch", None

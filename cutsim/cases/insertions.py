@@ -9,6 +9,7 @@ from cutsim.cases.domains import Domain, Entities
 from cutsim.cases.heating import temperature
 from cutsim.cases.interfaces import friction_of
 from cutsim.cases.refusals import refused, refusing
+from cutsim.cases.rigs import machines
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.studies.body import CrackedBody, cracked_state
@@ -45,6 +46,7 @@ def inserted(domain: Domain, mechanics: Mapping[str, Any]) -> tuple[Insertion, T
             notch=table.notch,
             friction=friction_of(tool, value),
             fixture=table.fixture,
+            machine=None if table.machine is None else machines([table.machine])[0],
             mechanics=mechanics,
         )
     return cut, value

@@ -24,6 +24,7 @@ from cutsim.bodies.schemes import Newmark, Scheme
 from cutsim.cases.constructed import Constructed, FromTable, With, annotated, choice, made, table_of
 from cutsim.cases.expressions import RowExpression
 from cutsim.cases.names import BodyName, CrackName, ToolName
+from cutsim.cases.schema_rigs import Machine
 from cutsim.cases.tables import NONNEGATIVE, POSITIVE, Flag, Table, Whole, chosen_by
 from cutsim.studies.body import Faces
 from cutsim.studies.drive import Drive
@@ -35,13 +36,16 @@ class Insertion(Constructed):
 
     Args:
         tool: Name of the tool.
-        depth: Depth of the tip at which the run ends [length]; or `until` in ``[analysis]``.
+        depth: Depth of the tip, or of the machine that pushes the tool, at which the run ends [length]; or `until` in
+            ``[analysis]``.
         push: In which push that is, 2 for the second one of a tool that turns.
         notch: Depth of the notch in which the tool is inserted, 0 for a body without one [length].
         groups: Groups of the facets of the crack, of those of the notch, and of the cells on the '+' side of both.
         faces: How the faces of crack and notch meet.
         fixture: Groups where the tool enters and where the body is held.
         damping: Kelvin–Voigt viscosity over Young's modulus of every layer [time].
+        machine: What drives the whole tool along the push, whose direction is its axis; by default the tool follows the
+            motion that speed and times give, which otherwise is that of the machine.
     """
 
     tool: ToolName = "tool"
@@ -52,6 +56,7 @@ class Insertion(Constructed):
     faces: Annotated[Faces, FromTable()] = Field(default_factory=Faces)
     fixture: Annotated[Fixture, FromTable()] = Field(default_factory=Fixture)
     damping: Annotated[Time, NONNEGATIVE] = 0.0
+    machine: Machine | None = None
 
     @property
     def drive(self) -> Drive:

@@ -1,7 +1,10 @@
-"""Motion of a pushed tool: into the notch, at constant speed to a depth, and perhaps back and in again."""
+"""Motion of a pushed tool: into the notch, at constant speed to a depth, and perhaps back and in again.
+
+Where a machine pushes the tool, this is the motion of the machine.
+"""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,12 +12,15 @@ from numpy.typing import NDArray
 from cutsim.base.checks import above, at_least, between, nonnegative, positive, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.base.units import Length, Number, Time, Velocity
+from cutsim.bodies.machine import Machine
 from cutsim.studies.frame import Frame
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.shapes import ToolPath
 
 #: Depth of the tip, as a part of the depth of the notch, when the push begins.
 TIP_IN_NOTCH = 0.8
+# difference of a cosine from 1 of directions that are the same
+_ALIGNED = 1e-9
 
 
 @checked
@@ -134,6 +140,37 @@ class Motion:
         if way > leg:
             way = max(leg, way - self.speed * self.dwell)
         return self.start_depth + (way if way <= leg else abs(2 * leg - way))
+
+    def driven(self, machine: Machine, frame: Frame, symmetry_factor: float) -> tuple[Machine, float]:
+        """The machine of what is meshed, and the time from which on it drives the tool.
+
+        A machine with a stiffness drives it from the start.  One without, which cannot hold a tool that does not touch
+        the body yet, takes over when the push begins.
+
+        Args:
+            machine: The machine of the whole tool.
+            frame: Which way the tool goes.
+            symmetry_factor: Factor from what is meshed to the whole body.
+
+        Raises:
+            ValueError: It does not act along the push, has a stiffness and a velocity, or has no stiffness though the
+                tool is to turn back.
+        """
+        along = not machine.turns and bool(machine.direction(len(frame.push)) @ frame.push > 1 - _ALIGNED)
+        require("machine.axis", machine.axis, along, f"the direction of the push, {tuple(map(float, frame.push))}")
+        stiff = machine.stiffness > 0
+        require("machine.velocity", machine.velocity, not (stiff and machine.velocity), "0 with a stiffness")
+        turns = self.turning_depth is not None
+        require("machine.stiffness", machine.stiffness, stiff or not turns, "> 0 with a turning_depth")
+        share, force = 1 / symmetry_factor, machine.force
+        amounts = {name: share * getattr(machine, name) for name in ("stiffness", "damping", "mass", "weight")}
+        part = (lambda time: share * force(time)) if callable(force) else share * force
+        return replace(machine, force=part, **amounts), 0.0 if stiff else self.entry_time
+
+    def push(self, frame: Frame, *, halves: bool) -> ToolPath:
+        """Path of the whole tool along the push, without the spreading of its halves."""
+        start = self.start_depth if halves else -np.inf
+        return ToolPath(lambda time: frame.point(max(self.depth(time), start)), self.corners)
 
     def path(self, frame: Frame, tool: Pointed) -> ToolPath:
         """ToolPath of a tool, or of a half of it, in a frame."""

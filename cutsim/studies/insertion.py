@@ -13,6 +13,7 @@ from cutsim.analysis.mechanics import Mechanics
 from cutsim.base.checks import above, nonnegative, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.bodies.loads import Support
+from cutsim.bodies.machine import Machine
 from cutsim.fields.points import Surface
 from cutsim.fields.state import State
 from cutsim.interface.crack import Crack
@@ -24,6 +25,7 @@ from cutsim.studies.drive import Drive, Motion
 from cutsim.studies.fixture import STANDING, Fixture
 from cutsim.studies.frame import Frame
 from cutsim.studies.plate import RestingPlate
+from cutsim.tools.carriage import Carriage
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.tool_contact import ToolContact, doubt_units
 from cutsim.tools.tool_parts import PARTS, ToolParts
@@ -52,6 +54,8 @@ class Insertion:
         areas: How far each part of the crack has been cut.
         plate: What is under the body: a support, or a plate on which it rests.
         mechanics: The problem to run.
+        carriage: What a machine drives along the push, with all of the tool on it; None for a tool that follows its
+            motion.
         symmetry_factor: Factor from what is meshed to the whole body, 2 with a plane of symmetry.
     """
 
@@ -64,6 +68,7 @@ class Insertion:
     areas: tuple[CutArea, ...]
     plate: Support | RestingPlate
     mechanics: Mechanics
+    carriage: Carriage | None
     symmetry_factor: float
 
     @classmethod
@@ -77,6 +82,7 @@ class Insertion:
         notch: float = 0.0,
         friction: AnyFriction = None,
         fixture: Fixture = STANDING,
+        machine: Machine | None = None,
         mechanics: Mapping[str, Any] | None = None,
     ) -> Self:
         """Put the problem together and compile its forms. Collective.
@@ -88,6 +94,9 @@ class Insertion:
             notch: Depth of the notch in which the tool is inserted, 0 for a body without one [length].
             friction: Friction of tool and body, a law, or the coefficient of Coulomb's; None for none.
             fixture: Names of groups of the mesh, and how the body is held.
+            machine: What drives the tool along the push, as a whole: then the motion along it is that of the machine,
+                and where the tool goes is found. The spreading in the notch stays prescribed. A machine without
+                stiffness takes over when the push begins, with its initial velocity.
             mechanics: Further arguments of `Mechanics`, such as ``{"analysis": "dynamic"}``.
 
         Raises:
@@ -100,7 +109,13 @@ class Insertion:
         _check_notch(body, tool, frame, notch)
         motion = Motion.of(drive, tool, notch, np.inf if fixture.ends else frame.height)
         doubt_units(body.state.verdict, _kind(tool), tool, frame.height)
-        contacts = _contacts(body, tool, frame, motion, fixture.top, friction)
+        factor = 2.0 if fixture.halved(body) else 1.0
+        carriage = None
+        if machine is not None:
+            driven, release = motion.driven(machine, frame, factor)
+            path = motion.push(frame, halves=not body.state.axisymmetric)
+            carriage = Carriage(body.state, path, [driven], name=f"{_kind(tool)}_drive", release=release)
+        contacts = _contacts(body, tool, frame, motion, fixture.top, friction, carriage)
         parts, plate = ToolParts(contacts, tool), fixture.support(body, frame)
         resting, held = ([], [plate]) if isinstance(plate, Support) else ([plate], [])
         problem = Mechanics(
@@ -110,8 +125,8 @@ class Insertion:
             observers=[parts],
             **(mechanics or {}),
         )
-        factor, areas = 2.0 if fixture.halved(body) else 1.0, tuple(CutArea(crack) for crack in body.cracks)
-        return cls(body, tool, frame, motion, contacts, parts, areas, plate, problem, factor)
+        areas = tuple(CutArea(crack) for crack in body.cracks)
+        return cls(body, tool, frame, motion, contacts, parts, areas, plate, problem, carriage, factor)
 
     @property
     def state(self) -> State:
@@ -124,7 +139,7 @@ class Insertion:
         return self.frame.depth(self.contacts[0].position.value)
 
     def time_of(self, depth: float, push: int = 1) -> float:
-        """Time at which the tip is this deep below the surface in the first or second push [time].
+        """Time at which the tip, or the machine that pushes it, is this deep in the first or second push [time].
 
         Raises:
             ValueError: The push begins deeper, the body or the first push ends before, or there is no such push.
@@ -195,6 +210,7 @@ def _contacts(
     motion: Motion,
     top: tuple[str, str],
     friction: AnyFriction,
+    carriage: Carriage | None,
 ) -> tuple[ToolContact, ...]:
     """The tool on each face of each part of the crack."""
     plus = frame.side(body.cracks[0])
@@ -216,6 +232,7 @@ def _contacts(
                 contact=half.firm_contact(crack.young, crack.normal_size) if firm else soft,
                 friction=completed(friction, soft.stiffness),
                 name=name,
+                machines=() if carriage is None else carriage,
             )
             if crack is not body.cracks[0]:  # how deep the cut will go is not known
                 contact.may_miss()

@@ -1,4 +1,4 @@
-"""Rigid motion of a tool as unknowns, found together with the displacement of the body (docs/test_rigs.md)."""
+"""What a tool on a driven rigid motion adds to the equations of that motion (docs/test_rigs.md)."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -9,39 +9,35 @@ import ufl
 from dolfinx import default_scalar_type, fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from cutsim.base.arrays import Array
-from cutsim.base.assembly import box, integrate, nodal_forces, summed
+from cutsim.base.assembly import box, integrate, nodal_forces
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps, form
 from cutsim.base.kinematics import Expr
 from cutsim.base.rotations import rotation_derivatives, rotation_vector
-from cutsim.base.terms import BorderBlocks
 from cutsim.bodies.machine import Machine
 from cutsim.bodies.rigid_motion import Coordinate, RigidMotion
-from cutsim.bodies.schemes import Scheme
 from cutsim.fields.points import Surface
 from cutsim.fields.space import locate_face_dofs
 from cutsim.fields.state import State
 
 # cosine between axes that counts as none
 _RIGHT = 1e-9
-# eigenvalue of the contact's stiffness, over the sum of all, that is none
-_NOTHING = 1e-12
 
 #: Position and rotation matrix of a tool, or changes of them.
 Pose = tuple[Array, Array]
 
 
 class MachineAxes:
-    """Path of a driven tool, and the axes along which machines let it deviate from that.
+    """Path of a driven rigid motion, and the axes along which machines let it deviate from that.
 
     Args:
         state: Displacement and time.
-        name: Name of the tool.
-        path: Position and rotation of the path at a time, the latter a matrix.
+        name: Name of the motion.
+        path: Position and rotation of the path at a time, the latter a matrix; rotations are about this position.
         machines: What drives each axis.
+        release: Time until which the path is followed, 0 for never [time].
 
     Attributes:
         motion: The coordinates: way along each axis since the start, of which the path prescribes that of the machine.
@@ -49,11 +45,20 @@ class MachineAxes:
         shifts: Change of position by each of them, one a row.
 
     Raises:
-        ValueError: Axes of translations or of rotations are not at right angles, or an axis makes no sense here.
+        ValueError: There is no machine, axes of translations or of rotations are not at right angles, or an axis makes
+            no sense here.
     """
 
-    def __init__(self, state: State, name: str, path: Callable[[float], Pose], machines: Sequence[Machine]) -> None:
-        gdim = state.mesh.geometry.dim
+    def __init__(
+        self,
+        state: State,
+        name: str,
+        path: Callable[[float], Pose],
+        machines: Sequence[Machine],
+        release: float = 0.0,
+    ) -> None:
+        require("machines", len(machines), len(machines) > 0, "at least one machine")
+        gdim, self._state, self._path = state.mesh.geometry.dim, state, path
         axes = [m.direction(gdim) for m in machines]
         self.turns = any(m.turns for m in machines)
         _check_axes(machines, axes, axisymmetric=state.axisymmetric)
@@ -65,37 +70,43 @@ class MachineAxes:
             Coordinate(_name(i, m), m, partial(_way, path, m, axis), radius if m.turns else 1.0)
             for i, (m, axis) in enumerate(zip(machines, axes, strict=True))
         ]
-        self.motion = RigidMotion(state.memory, name, coordinates, state.dt)
+        self.motion = RigidMotion(state.memory, name, coordinates, state.dt, release)
 
-    def pose(self, path: Pose, ahead: Array) -> Pose:
-        """Where the tool is.
+    def pose(self, path: Pose, fraction: float, time: float) -> Pose:
+        """Where a tool on this motion is after a fraction of the step, which is a time.
 
         Args:
-            path: Pose of the path at the same time.
-            ahead: How far each coordinate is ahead of the path.
+            path: Pose of the tool's own path at that time.
+            fraction: The fraction.
+            time: The time.
         """
-        gdim = len(path[0])
+        ahead, (centre, _) = self.motion.ahead(fraction, time), self._path(time)
+        gdim = len(centre)
         turn = rotation_derivatives(ahead @ self._spins)[0][:gdim, :gdim]
-        return path[0] + ahead @ self.shifts, turn @ path[1]
+        return centre + turn @ (path[0] - centre) + ahead @ self.shifts, turn @ path[1]
 
-    def slopes(self, rotation: Array) -> tuple[list[Pose], list[list[Array]]]:
-        """Derivatives of the pose by the unknowns, and second ones of its rotation, at the end of the step.
+    def slopes(self, pose: Pose) -> tuple[list[Pose], list[list[Pose]]]:
+        """First and second derivatives of the pose of a tool by the unknowns, at the end of the step.
 
         Args:
-            rotation: The present rotation.
+            pose: The present pose of the tool.
         """
-        gdim, motion = len(rotation), self.motion
-        turn, first, second = rotation_derivatives((motion.values - motion.paths) @ self._spins)
-        rest = turn[:gdim, :gdim].T @ rotation
+        gdim, motion = len(pose[0]), self.motion
+        ahead = motion.values - motion.paths
+        turn, first, second = rotation_derivatives(ahead @ self._spins)
+        back = turn[:gdim, :gdim].T
+        arm = back @ (pose[0] - self._path(self._state.time)[0] - ahead @ self.shifts)
+        rest = back @ pose[1]
         shifts, spins = (axes / motion.units[:, None] for axes in (self.shifts, self._spins))
-        turns = np.einsum("mk,kij->mij", spins, first)[:, :gdim, :gdim] @ rest
-        curvature = np.einsum("mk,nl,klij->mnij", spins, spins, second)[..., :gdim, :gdim] @ rest
-        return list(zip(shifts, turns, strict=True)), [list(row) for row in curvature]
+        turns = np.einsum("mk,kij->mij", spins, first)[:, :gdim, :gdim]
+        curvature = np.einsum("mk,nl,klij->mnij", spins, spins, second)[..., :gdim, :gdim]
+        slopes = list(zip(shifts + turns @ arm, turns @ rest, strict=True))
+        return slopes, [list(zip(row @ arm, row @ rest, strict=True)) for row in curvature]
 
 
 def _name(place: int, machine: Machine) -> str:
     """Name of a coordinate: its axis, or its number where the axis is a vector."""
-    return f"drive_{machine.axis.lstrip('-') if isinstance(machine.axis, str) else place + 1}"
+    return machine.axis.lstrip("-") if isinstance(machine.axis, str) else str(place + 1)
 
 
 def _way(path: Callable[[float], Pose], machine: Machine, axis: Array, time: float) -> float:
@@ -116,30 +127,23 @@ def _check_axes(machines: Sequence[Machine], axes: Sequence[Array], *, axisymmet
         require(f"machines[{i}].axis", machine.axis, right, "at right angles to those before")
 
 
-class DrivenTool(ABC):
-    """Base of the unknowns of a driven tool, as `cutsim.base.terms.Border`.
+class DrivenPart(ABC):
+    """Base of a contact that acts on a driven rigid motion, and moves with it.
 
     Args:
         comm: Communicator of the mesh.
-        name: Name of the tool.
-        axes: Its coordinates.
+        axes: Coordinates of the motion.
         move: Moves the tool to the end of the step.
         touched: Owned dofs of the surfaces that it can touch.
 
     Attributes:
-        motion: Its coordinates over the steps.
-        held: None of them.
-        tied: No displacement.
+        axes: As above.
+        move: As above.
         touched: As above.
     """
 
-    def __init__(
-        self, comm: MPI.Comm, name: str, axes: MachineAxes, move: Callable[[], None], touched: NDArray[np.int32]
-    ) -> None:
-        self._comm = comm
-        self._name, self.axes, self.motion, self._move = name, axes, axes.motion, move
-        self.held, self.tied, self.touched = self.motion.held, np.empty(0, dtype=np.int32), touched
-        self._reaction = np.zeros(len(self.held))
+    def __init__(self, comm: MPI.Comm, axes: MachineAxes, move: Callable[[], None], touched: NDArray[np.int32]) -> None:
+        self._comm, self.axes, self.move, self.touched = comm, axes, move, touched
 
     @abstractmethod
     def reaction(self) -> Array:
@@ -156,71 +160,6 @@ class DrivenTool(ABC):
     @abstractmethod
     def corner(self) -> Array:
         """Derivative of the reaction by the unknowns. Collective."""
-
-    @property
-    def values(self) -> Array:
-        """The present unknowns [length]."""
-        return self.motion.values * self.motion.units
-
-    @property
-    def target(self) -> Array:
-        """Prescribed values: none."""
-        return np.empty(0)
-
-    def assign(self, values: Array, u: Array) -> None:
-        """Set the unknowns, and move the tool."""
-        self.motion.assign(values / self.motion.units)
-        self._move()
-
-    def residual(self, forces: Array, jump: Array | None) -> Array:
-        """Equations of motion; arguments as `Border.residual`. Collective."""
-        self._reaction = self.reaction()
-        advance = self._reaction if jump is None else self._reaction + summed(self._comm, self.rows() @ jump)
-        return self.motion.equations(advance * self.motion.units) / self.motion.units
-
-    @property
-    def loads(self) -> Array:
-        """Forces of the machines and of the body at the last residual [force]."""
-        return np.maximum(self.motion.loads / self.motion.units, np.abs(self._reaction))
-
-    def blocks(self, stiffness: PETSc.Mat) -> BorderBlocks:
-        """Derivatives at the present unknowns. Collective."""
-        own = np.diag(self.motion.stiffness() / self.motion.units**2)
-        return BorderBlocks(self.columns(), -self.rows(), own - self.corner())
-
-    def restrained(self, motions: Array) -> Array:
-        """Nothing: what the contact resists is in the tangent."""
-        return np.zeros_like(motions)
-
-    def free(self) -> str | None:
-        """A motion that neither machine nor contact resists at the committed state, in words, or None. Collective."""
-        loose = [i for i, c in enumerate(self.motion.coordinates) if c.machine is None or not c.machine.holds]
-        if not loose:
-            return None
-        stiffness = -self.corner()[np.ix_(loose, loose)]
-        values, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
-        if values[0] > _NOTHING * np.abs(values).sum():
-            return None
-        axes = [self.motion.coordinates[i].machine.axis for i in loose]  # type: ignore[union-attr]
-        along = " and ".join(repr(axes[i]) for i in np.flatnonzero(np.abs(vectors[:, 0]) > 0.1))
-        return (
-            f"{self._name} is free along {along}: nothing resists its forces. Give its machine a stiffness, a damping "
-            "or a mass, or let it begin in contact with the body"
-        )
-
-    def integrate(self, scheme: Scheme) -> None:
-        """Use a time integration scheme for the inertia of the machines."""
-        self.motion.scheme = scheme
-
-    def predict(self) -> None:
-        """Go on at the rate of the last step."""
-        self.motion.predict()
-        self._move()
-
-    def settle(self, forces: Array) -> None:
-        """Take note of the force of the body at the end of a step. Collective."""
-        self._reaction = self.reaction()
-        self.motion.settle(self._reaction * self.motion.units)
 
 
 class _VirtualMotion:
@@ -247,16 +186,15 @@ class _VirtualMotion:
         return moved if self._R is None else moved + ufl.inner(ufl.diff(f, pose[1]), self._R)
 
 
-class DrivenContact(DrivenTool):
-    """Unknowns of a driven tool whose contact is written as forms, which UFL differentiates by its pose.
+class DrivenContact(DrivenPart):
+    """Contact of a driven tool that is written as forms, which UFL differentiates by its pose.
 
     Args:
         state: Displacement and time.
-        name: Name of the tool.
-        axes: Its coordinates.
+        axes: Coordinates of the motion.
         move: Moves the tool to the end of the step.
         pose: Position and rotation as variables of the forms.
-        rotation: The rotation.
+        constants: Position and rotation themselves.
         touches: For each surface the traction on the tool, and the place of its points in the frame of the tool.
         entity_maps: Entity maps of the forms.
     """
@@ -264,18 +202,17 @@ class DrivenContact(DrivenTool):
     def __init__(
         self,
         state: State,
-        name: str,
         axes: MachineAxes,
         move: Callable[[], None],
         *,
         pose: tuple[Expr, Expr],
-        rotation: fem.Constant,
+        constants: tuple[fem.Constant, fem.Constant],
         touches: Sequence[tuple[Surface, Expr, Expr]],
         entity_maps: EntityMaps,
     ) -> None:
         nodes = np.unique(np.concatenate([locate_face_dofs(state.V, surface.entities) for surface, _, _ in touches]))
-        super().__init__(state.mesh.comm, name, axes, move, owned_dofs(state, nodes))
-        self._rotation = rotation
+        super().__init__(state.mesh.comm, axes, move, owned_dofs(state, nodes))
+        self._constants = constants
         self._first, self._second = (_VirtualMotion(state, turns=axes.turns) for _ in range(2))
         v = ufl.TestFunction(state.V)
 
@@ -295,8 +232,9 @@ class DrivenContact(DrivenTool):
             form(f, entity_maps=entity_maps) for f in (work, column, ufl.derivative(work, state.u, v), corner)
         )
 
-    def _slopes(self) -> tuple[list[Pose], list[list[Array]]]:
-        return self.axes.slopes(np.asarray(self._rotation.value))
+    def _slopes(self) -> tuple[list[Pose], list[list[Pose]]]:
+        position, rotation = (np.asarray(c.value) for c in self._constants)
+        return self.axes.slopes((position, rotation))
 
     def _each(self, evaluate: Callable[[], Array | float]) -> Array:
         """A quantity for each unknown in turn."""
@@ -328,7 +266,7 @@ class DrivenContact(DrivenTool):
                 self._second.set(other)
                 found[i, j] = integrate(self._corner)
         for i, j in np.ndindex(found.shape if self.axes.turns else (0, 0)):
-            self._first.set((np.zeros_like(poses[i][0]), curvature[i][j]))
+            self._first.set(curvature[i][j])
             found[i, j] += integrate(self._work)
         return found
 

@@ -4,7 +4,7 @@ Forces f of the contact depend on the places of the body's points relative to th
 changes them by −K e, with K the tangent of the contact and e the same translation of all nodes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,22 +14,19 @@ from cutsim.base.arrays import Array
 from cutsim.base.assembly import owned_vector, summed
 from cutsim.base.checks import require
 from cutsim.base.terms import Assembler
-from cutsim.bodies.machine import Machine
 from cutsim.fields.state import State
-from cutsim.tools.driven_tool import DrivenTool, MachineAxes, owned_dofs
+from cutsim.tools.driven_tool import DrivenPart, MachineAxes, owned_dofs
 
 
-class DrivenAssembler(DrivenTool):
-    """Unknowns of a driven tool that does not turn, whose contact assembles itself.
+class DrivenAssembler(DrivenPart):
+    """Contact of a driven tool that does not turn, which assembles itself.
 
     Args:
         state: Displacement and time.
-        name: Name of the tool.
-        axes: Its coordinates.
+        axes: Coordinates of the motion.
         move: Moves the tool to the end of the step.
         contact: The forces of the contact; their pattern never changes.
         nodes: Local nodes (blocked dofs) that it can touch.
-        machines: What drives it.
 
     Raises:
         ValueError: A machine turns the tool.
@@ -38,17 +35,16 @@ class DrivenAssembler(DrivenTool):
     def __init__(
         self,
         state: State,
-        name: str,
         axes: MachineAxes,
         move: Callable[[], None],
         *,
         contact: Assembler,
         nodes: NDArray[np.int32],
-        machines: Sequence[Machine],
     ) -> None:
-        for i, machine in enumerate(machines):
-            require(f"machines[{i}].axis", machine.axis, not machine.turns, "a translation for a tool of triangles")
-        super().__init__(state.mesh.comm, name, axes, move, owned_dofs(state, nodes))
+        for i, c in enumerate(axes.motion.coordinates):
+            axis = None if c.machine is None else c.machine.axis
+            require(f"machines[{i}].axis", axis, not c.turns, "a translation for a tool of triangles")
+        super().__init__(state.mesh.comm, axes, move, owned_dofs(state, nodes))
         self._contact = contact
         index_map, size = state.V.dofmap.index_map, state.V.dofmap.index_map_bs
         self._f = owned_vector(index_map, size)

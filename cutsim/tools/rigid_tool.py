@@ -8,15 +8,15 @@ import numpy as np
 from dolfinx import default_scalar_type, fem
 from numpy.typing import NDArray
 
-from cutsim.base.checks import as_array, require
-from cutsim.base.rotations import rotation_matrix, rotation_vector
-from cutsim.base.terms import Border, Term
+from cutsim.base.checks import require
+from cutsim.base.rotations import rotation_vector
+from cutsim.base.terms import Term
 from cutsim.bodies.machine import Machine
 from cutsim.fields.points import Surface, Values
 from cutsim.fields.state import State
 from cutsim.interface.doubts import doubt_penetration
 from cutsim.interface.slip import SlipHistory
-from cutsim.tools.driven_tool import DrivenTool, MachineAxes
+from cutsim.tools.carriage import Carriage
 from cutsim.tools.shapes import ToolPath
 
 _AXES = "xyz"
@@ -47,9 +47,10 @@ class RigidTool(Term, ABC):
         path: Motion of the reference point, and rotation about it.
         name: Name in messages and output.
         machines: What drives the tool, each along one axis, along which the path is that of the machine; along all
-            others the tool follows the path itself.
+            others the tool follows the path itself. Or the carriage that it shares with other tools.
 
     Attributes:
+        carriage: What carries it along unknown ways; None if it follows its path.
         position: Present position of the reference point [length].
         rotation: Present rotation R, a matrix: a point x of the body lies at Rᵀ(x − position) in the tool's frame.
         temperature: Temperature of the tool, as friction feels it; `cutsim.heat.tool_heat` knows it.
@@ -58,12 +59,12 @@ class RigidTool(Term, ABC):
         ValueError: The path has another dimension than the mesh, or turns the tool of a body of revolution.
     """
 
-    def __init__(self, state: State, path: ToolPath, name: str, machines: Sequence[Machine] = ()) -> None:
+    def __init__(self, state: State, path: ToolPath, name: str, machines: Sequence[Machine] | Carriage = ()) -> None:
         gdim = state.mesh.geometry.dim
         turns = path.rotation is not None
         require("path.rotation", path.rotation, not (turns and state.axisymmetric), "None for a body of revolution")
         self.name, self.state, self.path = name, state, path
-        position, rotation = (np.array(p, dtype=default_scalar_type) for p in _pose(path, 0.0, gdim))
+        position, rotation = (np.array(p, dtype=default_scalar_type) for p in path.pose(0.0, gdim))
         self.position, self.rotation = fem.Constant(state.mesh, position), fem.Constant(state.mesh, rotation)
         self._position = state.memory.array(f"{name}: position", self.position)
         self._rotation = state.memory.array(f"{name}: rotation", self.rotation)
@@ -71,8 +72,11 @@ class RigidTool(Term, ABC):
         state.memory.array(f"{name}: temperature", self.temperature)
         none: _Action = (np.zeros(gdim), np.zeros(3 if gdim == 3 else 1))
         self._action = state.memory.value(f"{name}: force and moment", none)
-        self._axes = MachineAxes(state, name, lambda t: _pose(path, t, gdim), machines) if machines else None
-        self._driven: DrivenTool | None = None
+        self.carriage: Carriage | None = None
+        if isinstance(machines, Carriage):
+            self.carriage = machines
+        elif machines:
+            self.carriage = Carriage(state, path, machines, name=f"{name}_drive")
         state.verdict.suppose(self._untouched, f"{name} has never touched the body")
 
     @property
@@ -87,24 +91,18 @@ class RigidTool(Term, ABC):
 
     @property
     def corners(self) -> tuple[float, ...]:
-        """Times at which the tool's velocity or a force of a machine jumps."""
-        return self.path.corners if self._axes is None else (*self.path.corners, *self._axes.motion.corners)
+        """Times at which the tool's velocity jumps."""
+        return self.path.corners
 
     @property
-    def rate_dependent(self) -> bool:
-        """Whether forces depend on the size of the step."""
-        return super().rate_dependent or (self._axes is not None and self._axes.motion.rate_dependent)
-
-    @property
-    def border(self) -> Border | None:
-        """The motion of the tool as unknowns, None if it follows its path."""
-        return self._driven
+    def companions(self) -> Sequence[Term]:
+        """What carries it."""
+        return [] if self.carriage is None else [self.carriage]
 
     @property
     def heading(self) -> NDArray[np.float64]:
         """Axis along which the first machine pushes it, zero if none does."""
-        axes = [] if self._axes is None else [axis for axis in self._axes.shifts if axis.any()]
-        return np.asarray(axes[0]) if axes else np.zeros_like(self.position.value)
+        return np.zeros_like(self.position.value) if self.carriage is None else self.carriage.heading
 
     @property
     def displacement(self) -> NDArray[np.float64]:
@@ -121,35 +119,22 @@ class RigidTool(Term, ABC):
         self._action.trial = force, moment
 
     def begin(self) -> None:
-        """Move the tool to where it is at the end of the step; one that is driven begins where it is."""
-        if self._driven is not None:
-            motion = self._driven.motion
-            rest = np.zeros_like(motion.values)
-            motion.begin(self.state.time_old, self.state.time, rest if motion.started else self._driven.reaction())
-        self.move(1.0)
+        """Move the tool to where it is at the end of the step, unless a carriage does so."""
+        if self.carriage is None:
+            self.move(1.0)
 
     def move(self, fraction: float) -> None:
         """Move the tool to where it is after a fraction of the step."""
         time = self.state.time_old + fraction * (self.state.time - self.state.time_old)
-        pose = _pose(self.path, time, len(self.position.value))
-        if self._axes is not None:
-            pose = self._axes.pose(pose, self._axes.motion.ahead(fraction, time))
+        pose = self.path.pose(time, len(self.position.value))
+        if self.carriage is not None:
+            pose = self.carriage.axes.pose(pose, fraction, time)
         self.position.value[:], self.rotation.value[:] = pose
 
     def external_work(self) -> float:
-        """Work of the tool on the body in the step, mean force and moment times their increments. Collective.
-
-        Where machines drive it, it is they who do the work, of which a part stays with them and the tool.
-        """
+        """Work of the tool on the body in the step, mean force and moment times their increments. Collective."""
         force, moment = (0.5 * (now + old) for now, old in zip(self._action.trial, self._action.committed, strict=True))
-        work = float(-force @ self.displacement - moment @ self.turn)
-        return work if self._driven is None else work + self._driven.motion.work() - self._driven.motion.passed_on()
-
-    def _with_machines(self, energies: dict[str, float]) -> dict[str, float]:
-        """Energies of the contact, with those of the machines."""
-        for entry, value in ({} if self._driven is None else self._driven.motion.energies()).items():
-            energies[entry] = energies.get(entry, 0.0) + value
-        return energies
+        return float(-force @ self.displacement - moment @ self.turn)
 
     def force(self) -> NDArray[np.float64]:
         """Force on the tool in the trial state, from the virtual work of a rigid translation [force]."""
@@ -165,7 +150,7 @@ class RigidTool(Term, ABC):
         gdim = len(force)
         columns = {f"{self.name}_{_AXES[i]}": (float(self.position.value[i]), "length") for i in range(gdim)}
         axes = _AXES if gdim == 3 else "z"
-        if self.path.rotation is not None or (self._axes is not None and self._axes.turns):
+        if self.path.rotation is not None or (self.carriage is not None and self.carriage.axes.turns):
             angles = zip(axes, rotation_vector(self.rotation.value), strict=True)
             columns |= {f"{self.name}_rotation_{a}": (float(angle), "angle") for a, angle in angles}
         columns |= {f"{self.name}_force_{_AXES[i]}": (float(force[i]), "force") for i in range(gdim)}
@@ -175,7 +160,7 @@ class RigidTool(Term, ABC):
             sticks, slips = np.sum([slip.areas() for slip in self.slips], axis=0)
             kind = self.state.facet_measure
             columns |= {f"{self.name}_sticking": (float(sticks), kind), f"{self.name}_slipping": (float(slips), kind)}
-        return columns if self._driven is None else columns | self._driven.motion.record(self.name)
+        return columns
 
     @property
     @abstractmethod
@@ -200,16 +185,3 @@ class RigidTool(Term, ABC):
     @property
     def _untouched(self) -> str:
         return f"{self.name}: untouched"
-
-
-def _pose(path: ToolPath, time: float, gdim: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position and rotation matrix of a path, if they are those of the mesh's dimension."""
-    position = as_array(f"path({time:.6g})", path.position(time))
-    require(f"path({time:.6g})", position, position.shape == (gdim,), f"a position of {gdim} components")
-    if path.rotation is None:
-        return position, np.eye(gdim)
-    name = f"path.rotation({time:.6g})"
-    turn = np.atleast_1d(as_array(name, path.rotation(time)))
-    words = "a rotation vector of 3 components" if gdim == 3 else "an angle"
-    require(name, turn, turn.shape == (3 if gdim == 3 else 1,), words)
-    return position, rotation_matrix(turn)

@@ -230,6 +230,26 @@ class ToolPath:
     def __post_init__(self) -> None:
         require_numbers("corners", self.corners, least=0)
 
+    def pose(self, time: float, gdim: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Position of the reference point and rotation matrix at a time.
+
+        Args:
+            time: The time.
+            gdim: Dimension of space.
+
+        Raises:
+            ValueError: They have another dimension.
+        """
+        position = as_array(f"path({time:.6g})", self.position(time))
+        require(f"path({time:.6g})", position, position.shape == (gdim,), f"a position of {gdim} components")
+        if self.rotation is None:
+            return position, np.eye(gdim)
+        name = f"path.rotation({time:.6g})"
+        turn = np.atleast_1d(as_array(name, self.rotation(time)))
+        words = "a rotation vector of 3 components" if gdim == 3 else "an angle"
+        require(name, turn, turn.shape == (3 if gdim == 3 else 1,), words)
+        return position, rotation_matrix(turn)
+
     @classmethod
     @checked
     def polyline(

@@ -23,6 +23,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.multiplier import ContactMultiplier
 from cutsim.interface.rubbing import AnyFriction, Friction, Rubbing, check_friction, completed, hotter
 from cutsim.interface.slip import SlipHistory
+from cutsim.tools.carriage import Carriage
 from cutsim.tools.driven_tool import DrivenContact
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
@@ -191,6 +192,7 @@ class ToolContact(RigidTool):
             as a whole is larger [length].
         name: Name in messages and output.
         machines: What drives the tool along some axes, each one unknown; along these the path is that of the machine.
+            Or the carriage that it shares with other tools.
 
     Attributes:
         patches: The tool on each surface.
@@ -212,7 +214,7 @@ class ToolContact(RigidTool):
         friction: AnyFriction = None,
         allowed_penetration: float | None = None,
         name: str = "tool",
-        machines: Sequence[Machine] = (),
+        machines: Sequence[Machine] | Carriage = (),
     ) -> None:
         check_friction("friction", friction)
         require_number("allowed_penetration", allowed_penetration, positive.or_none)
@@ -223,22 +225,22 @@ class ToolContact(RigidTool):
         laws = ToolLaws(contact, completed(friction, contact.stiffness), allowed_penetration)
         self.symmetric = laws.friction is None
         pose = self.position, self.rotation
-        if machines:  # forms that are differentiated by the pose name it
+        if self.carriage is not None:  # forms that are differentiated by the pose name it
             pose = ufl.variable(self.position), ufl.variable(self.rotation)
         self.patches = tuple(Patch(state, name, s, shape, pose, laws, self.temperature) for s in surfaces)
         self._energy_form = form(sum((p.energy() for p in self.patches), start=ufl.Form([])))
         self._contact_form = form(self.residual(ufl.TestFunction(state.V)), entity_maps=self.entity_maps)
-        if self._axes is not None:
-            self._driven = DrivenContact(
+        if self.carriage is not None:
+            part = DrivenContact(
                 state,
-                name,
-                self._axes,
+                self.carriage.axes,
                 lambda: self.move(1.0),
                 pose=pose,
-                rotation=self.rotation,
+                constants=(self.position, self.rotation),
                 touches=[(p.surface, p.traction, p.place) for p in self.patches],
                 entity_maps=self.entity_maps,
             )
+            self.carriage.border.add(part)
         self._passing = Passing(self, self.patches)
         self._doubt_resolution()
 
@@ -311,7 +313,7 @@ class ToolContact(RigidTool):
         for slip in self.slips:
             for entry, value in slip.energies().items():
                 total[entry] += value
-        return self._with_machines(total)
+        return total
 
 
 def doubt_units(verdict: Verdict, name: str, shape: Shape, body: float) -> None:

@@ -30,6 +30,7 @@ from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.pairing import Array, FacetShape, Indices
 from cutsim.pairs.partners import CurrentPartners
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
+from cutsim.tools.carriage import Carriage
 from cutsim.tools.driven_triangles import DrivenAssembler
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import ToolPath
@@ -123,6 +124,7 @@ class TriangulatedTool(RigidTool):
             default the mean size of the facets.
         name: Name in messages and output.
         machines: What drives the tool along some axes, each one unknown; along these the path is that of the machine.
+            Or the carriage that it shares with other tools.
 
     Raises:
         ValueError: A parameter is outside its range, a machine turns the tool, or path or surface have another
@@ -144,7 +146,7 @@ class TriangulatedTool(RigidTool):
         allowed_penetration: float | None = None,
         search: float | None = None,
         name: str = "tool",
-        machines: Sequence[Machine] = (),
+        machines: Sequence[Machine] | Carriage = (),
     ) -> None:
         check_friction("friction", friction)
         super().__init__(state, path, name, machines)
@@ -162,11 +164,10 @@ class TriangulatedTool(RigidTool):
         kinematics = CurrentPartners(state.memory, name, slave, master, search=search or size, size=size)
         laws = PairLaws(None, contact, completed(friction, contact.stiffness), allowed_penetration)
         self.touch = _Touch(state, name, points, (kinematics,), laws, weight=1.0, tool=self.temperature)
-        if self._axes is not None:
-            nodes = locate_dofs(state.V, gdim - 1, face.facets)
-            self._driven = DrivenAssembler(
-                state, name, self._axes, lambda: self.move(1.0), contact=self.touch, nodes=nodes, machines=machines
-            )
+        if self.carriage is not None:
+            nodes, axes = locate_dofs(state.V, gdim - 1, face.facets), self.carriage.axes
+            part = DrivenAssembler(state, axes, lambda: self.move(1.0), contact=self.touch, nodes=nodes)
+            self.carriage.border.add(part)
 
     @property
     def touched(self) -> Sequence[_Touch]:
@@ -222,4 +223,4 @@ class TriangulatedTool(RigidTool):
 
     def energies(self) -> dict[str, float]:
         """Energy of the contact penalty, friction work, and work of the pressure that neither holds. Collective."""
-        return self._with_machines(self.touch.energies())
+        return self.touch.energies()

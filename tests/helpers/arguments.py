@@ -74,6 +74,7 @@ NAMED = {
 
 #: Values beside those, of what is more particular.
 SPECIAL: dict[str, dict[str, Any]] = {
+    "Carriage": {"path": "@path", "machines": (cutsim.Machine("y"),)},
     "Crack": {"facets": "@interface"},
     "Drive": {"turning_depth": 1.0},
     "ContactSurfaces": {"faces": ("@face",)},
