@@ -20,6 +20,7 @@ from cutsim.interface.contact import PenaltyContact
 from cutsim.materials.elastic import NeoHookean
 from cutsim.results.output import claim_folder, read_history
 from cutsim.results.recording import Recording
+from cutsim.solvers.iterations import Outcome
 from cutsim.tools.shapes import Ball, Plane, ToolPath
 from cutsim.tools.tool_contact import ToolContact, doubt_units
 from helpers.blocks import make_blocks
@@ -171,7 +172,7 @@ def test_a_run_that_ends_early_is_marked(tmp_path, error):
             if error is RuntimeError:
                 raise error("no more")
             if error is StepError:
-                mechanics.solve = lambda line_search=None: SimpleNamespace(converged=False, message="", iterations=1)
+                mechanics.solve = lambda line_search=None: Outcome(False, -1, "", 1, 0, ())
 
     with pytest.raises(error), Recording(folder, mechanics, 1.0, every=0) as recording:
         run(mechanics, 1.0, StepControl.fixed(0.25), record)
