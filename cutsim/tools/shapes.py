@@ -328,7 +328,7 @@ class ToolPath:
         x, v, e = _vectors(start=start, velocity=velocity, draw=draw)
         e = np.asarray(unit_vector("draw", tuple(e.tolist())))
         across = float(np.linalg.norm(v - (v @ e) * e))
-        require("velocity", v.tolist(), across > 1e-9 * np.linalg.norm(v), "not zero and not along draw")
+        require("velocity", v.tolist(), bool(across > 1e-9 * np.linalg.norm(v)), "not zero and not along draw")
         rate = v + ratio * np.linalg.norm(v) * e
         return cls(lambda s: x + rate * s)
 
