@@ -268,7 +268,7 @@ class RigidMotion:
         spring = self._k * _mean(old.values - old.path, now.values - now.path)
         work = _mean(old.force, now.force) @ way - spring @ far
         work -= _mean(old.reaction, reaction)[self.held] @ way[self.held]
-        taken = self._numerical(old, acceleration, velocity, way) - float(_mean(old.balance, balance) @ way)
+        taken = _numerical(self._m, old, acceleration, velocity, way) - float(_mean(old.balance, balance) @ way)
         self._motion.trial = replace(
             now,
             velocity=velocity,
@@ -280,11 +280,6 @@ class RigidMotion:
             work=float(work) + old.blow,
             blow=0.0,
         )
-
-    def _numerical(self, old: _Motion, acceleration: Array, velocity: Array, way: Array) -> float:
-        """Work of inertia that is not found in the kinetic energy."""
-        work = self._m * 0.5 * (old.acceleration + acceleration) @ way
-        return float(work - 0.5 * self._m @ (velocity**2 - old.velocity**2))
 
     def work(self) -> float:
         """Work of machines, forces and what is prescribed, in the step [energy]."""
@@ -323,3 +318,9 @@ class RigidMotion:
 def _mean(first: Array, second: Array) -> Array:
     """Mean of the values at the start and the end of a step."""
     return 0.5 * (first + second)
+
+
+def _numerical(mass: Array, old: _Motion, acceleration: Array, velocity: Array, way: Array) -> float:
+    """Work of inertia that is not found in the kinetic energy."""
+    work = mass * 0.5 * (old.acceleration + acceleration) @ way
+    return float(work - 0.5 * mass @ (velocity**2 - old.velocity**2))
