@@ -90,7 +90,8 @@ def test_faces_of_a_thread_are_not_alike():
 
 def test_a_body_that_is_held_at_its_ends_is_cut_through():
     """The bond is spent to its end, and on the shank between the two halves there is no force any more."""
-    body = cracked_block(block(notch=0.4, Lx=1.0), SOLID, BOND, viscosity=0.005, faces=Faces(symmetric=True, friction=0.3))
+    faces = Faces(symmetric=True, friction=0.3)
+    body = cracked_block(block(notch=0.4, Lx=1.0), SOLID, BOND, viscosity=0.005, faces=faces)
     tool, ends = Blade(np.radians(30), 0.1, 0.2), Fixture(ends=("far_left", "far_right"))
     cut, rows = Insertion.build(body, tool, Drive(1.0), notch=0.4, fixture=ends), []
     run(
