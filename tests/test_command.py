@@ -220,7 +220,7 @@ def test_variations():
 
 
 def test_jobs_are_processes_that_keep_their_exit_status(tmp_path):
-    jobs = [Job(tmp_path / name, arguments) for name, arguments in (("good", ("--version",)), ("bad", ("nonsense",)))]
+    jobs = [Job(tmp_path / name, ("-m", "cutsim", word)) for name, word in (("good", "--version"), ("bad", "nonsense"))]
     ended = {}
     Runner(tmp_path / "jobs", 2, "local", {}).run(jobs, lambda job, status: ended.update({job.folder.name: status}))
     assert ended == {"good": 0, "bad": 2}
@@ -228,7 +228,11 @@ def test_jobs_are_processes_that_keep_their_exit_status(tmp_path):
 
 
 def test_a_job_that_ends_before_it_has_begun_is_interrupted(tmp_path):
-    runner, job, ended = Runner(tmp_path / "jobs", 1, "local", {}), Job(tmp_path / "run", ("doctor",)), []
+    runner, job, ended = (
+        Runner(tmp_path / "jobs", 1, "local", {}),
+        Job(tmp_path / "run", ("-m", "cutsim", "doctor")),
+        [],
+    )
 
     def interrupt():
         while not job.pid.exists() or not job.pid.read_text():

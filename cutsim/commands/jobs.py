@@ -30,11 +30,11 @@ _ENDED_AT_ONCE = 128 + signal.SIGTERM
 
 @dataclass(frozen=True)
 class Job:
-    """A command that fills a folder.
+    """A Python program that fills a folder.
 
     Attributes:
-        folder: The folder; what the command says goes to log.txt in it.
-        arguments: Arguments of `cutsim`.
+        folder: The folder; what the program says goes to log.txt in it.
+        arguments: Arguments of Python.
     """
 
     folder: Path
@@ -42,7 +42,7 @@ class Job:
 
     @property
     def log(self) -> Path:
-        """What the command has said."""
+        """What the program has said."""
         return self.folder / "log.txt"
 
     @property
@@ -51,11 +51,11 @@ class Job:
         return self.folder / "pid"
 
     def run(self) -> int:
-        """Run the command, out of the reach of a terminal's Ctrl-C; its exit status."""
+        """Run the program, out of the reach of a terminal's Ctrl-C; its exit status."""
         self.folder.mkdir(parents=True, exist_ok=True)
         with self.log.open("w", encoding="utf-8") as log:
             process = subprocess.Popen(
-                [sys.executable, "-m", "cutsim", *self.arguments],
+                [sys.executable, *self.arguments],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
             )  # fmt: skip
         self.pid.write_text(str(process.pid))
@@ -64,7 +64,7 @@ class Job:
         return status if status >= 0 else 128 - status
 
     def interrupt(self) -> None:
-        """Ask the command, if it runs on this machine, to end after its step."""
+        """Ask the program, if it runs on this machine, to end after its step."""
         with suppress(OSError, ValueError):
             os.kill(int(self.pid.read_text()), signal.SIGTERM)
 

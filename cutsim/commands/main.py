@@ -29,6 +29,7 @@ from cutsim.commands import (
     resume,
     run,
     sweep,
+    validate,
 )
 from cutsim.commands.endings import endings
 from cutsim.commands.options import show_messages, talking
@@ -39,7 +40,7 @@ COMMANDS: dict[str, dict[str, ModuleType]] = {
     "Simulate": {"run": run, "resume": resume, "sweep": sweep},
     "Look at results": {"plot": plot, "compare": compare, "report": report, "animate": animate},
     "Find parameters": {"fit": fit, "fit-material": fit_material},
-    "Help": {"doctor": doctor},
+    "Help": {"doctor": doctor, "validate": validate},
 }
 
 

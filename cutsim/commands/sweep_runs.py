@@ -80,7 +80,7 @@ class SweepRun:
         arguments = ["run", str(self.case), "-o", str(self.folder), "--overwrite"]
         if has_checkpoint(self.folder):
             arguments = ["resume", str(self.folder)]
-        return Job(self.folder, (*arguments, "-n", str(ranks)))
+        return Job(self.folder, ("-m", "cutsim", *arguments, "-n", str(ranks)))
 
 
 class Statuses:

@@ -1,0 +1,156 @@
+"""``cutsim validate``: run what compares results with references, and make the page of it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cutsim.commands.endings import Ending
+from cutsim.commands.jobs import Job, Runner
+from cutsim.commands.options import console, table
+from cutsim.commands.sweep_runs import described
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from cutsim.validation.results import Result
+    from cutsim.validation.rows import Group, Run
+
+EXAMPLES = (
+    "cutsim validate --quick -j 2",
+    "cutsim validate --only dcb --only hertz",
+    "cutsim validate --page",
+)
+
+
+def command(
+    only: Annotated[list[str] | None, typer.Option(metavar="RUN", help="Run only these; repeat.")] = None,
+    folder: Annotated[Path, typer.Option(help="Folder of the programs, with the files of rows in rows/.")] = Path(
+        "tests/validation"
+    ),
+    docs: Annotated[Path, typer.Option(help="Folder of the page and of the results that it is made of.")] = Path(
+        "docs"
+    ),
+    jobs: Annotated[int, typer.Option("-j", "--jobs", min=1, help="Runs at once.")] = 1,
+    *,
+    quick: Annotated[bool, typer.Option("--quick", help="Reduced runs; the page is left as it is.")] = False,
+    page: Annotated[bool, typer.Option("--page", help="Make the page of the results that there are.")] = False,
+) -> None:
+    """Run cases and programs whose results have a reference, compare them, and make the page on validation.
+
+    It belongs to a copy of the sources, whose rows it reads. A row outside its tolerance makes the exit code 1. Runs
+    leave their files in results/validation.
+    """
+    from cutsim.validation.rows import read_rows
+
+    groups = read_rows(folder / "rows")
+    chosen = _chosen(groups, only or [], quick=quick) if not page else []
+    screen = console()
+    found = _results(chosen, folder, jobs, quick=quick, screen=screen)
+    if not quick:
+        _write(groups, found, docs)
+    outside = [result for result in found if not result.inside]
+    if found:
+        rows = [[r.key, _short(r.values[-1]), _short(r.expected), "" if r.inside else r.reason] for r in found]
+        screen.print(table(["row", "computed", "expected", ""], rows))
+        screen.print(f"{len(found) - len(outside)} of {len(found)} rows are within their tolerance", markup=False)
+    raise typer.Exit(Ending.QUESTIONABLE if outside else Ending.TRUSTED)
+
+
+def _short(value: float | None) -> str:
+    return "" if value is None else f"{value:.6g}"
+
+
+def _chosen(groups: Sequence[Group], only: Sequence[str], *, quick: bool) -> list[Run]:
+    """The runs that are asked for; quick ones with those of their rows that have a quick tolerance.
+
+    Raises:
+        ValueError: There is no run of a name that is asked for.
+    """
+    runs = {run.name: run for group in groups for run in group.run}
+    for name in only:
+        if name not in runs:
+            raise ValueError(f"--only {name}: there is no such run; there are {', '.join(runs)}")
+    found = [run for name, run in runs.items() if not only or name in only]
+    if not quick:
+        return found
+    reduced = (run.model_copy(update={"row": [row for row in run.row if row.quick]}) for run in found)
+    return [run for run in reduced if run.row]
+
+
+def _results(runs: Sequence[Run], folder: Path, jobs: int, *, quick: bool, screen: Console) -> list[Result]:
+    """Run everything that was chosen, and judge what was not interrupted."""
+    from cutsim.results.run_files import RunFiles
+    from cutsim.validation.results import judge
+
+    base = Path("results/validation") / ("quick" if quick else "full")
+    levels = {run.name: _jobs(run, folder, base, quick=quick) for run in runs}
+    statuses = dict[Path, int]()
+
+    def done(job: Job, status: int) -> None:
+        statuses[job.folder] = status
+        screen.print(f"{job.folder.relative_to(base)}: {described(status)}", markup=False)
+
+    ahead = [job for found in levels.values() for job in found]
+    for job in ahead:
+        shutil.rmtree(job.folder, ignore_errors=True)
+    if ahead:
+        Runner(base / "jobs", jobs, "local", {}).run(ahead, done)
+    found = list["Result"]()
+    for run in runs:
+        if all(statuses[job.folder] != Ending.INTERRUPTED for job in levels[run.name]):
+            files = [RunFiles.read(job.folder) for job in levels[run.name]]
+            found += [judge(run, row, files, quick=quick) for row in run.row]
+    return found
+
+
+def _jobs(run: Run, folder: Path, base: Path, *, quick: bool) -> list[Job]:
+    """The commands of a run, one for each level of its study; only the coarsest in a quick validation."""
+    reduced = ["--quick"] if quick else []
+    if run.program:
+        target = base / run.name
+        program = str(folder / f"{run.program}.py")
+        return [Job(target, (program, *run.arguments, *reduced, "--out", str(target)))]
+    levels = run.levels[:1] if quick else run.levels
+    found = list[Job]()
+    for number, changes in enumerate(levels, start=1):
+        target = base / (run.name if len(levels) == 1 else f"{run.name}-{number}")
+        sets = [part for key, value in changes.items() for part in ("--set", f"{key}={value}")]
+        arguments = ("-m", "cutsim", "run", run.case, *sets, *reduced, "-o", str(target), "--overwrite")
+        found.append(Job(target, arguments))
+    return found
+
+
+def _write(groups: Sequence[Group], found: Sequence[Result], docs: Path) -> None:
+    """Keep results, and make the page and the tables of other pages of all that there are."""
+    from cutsim.base.files import replace_file
+    from cutsim.validation.page import keyed, page, with_excerpts
+    from cutsim.validation.results import Findings
+
+    data = docs / "validation" / "results.json"
+    known = Findings.read(data)
+    if found:
+        known = known.with_results(found, _made(), [key for key, _ in keyed(groups)])
+        known.write(data)
+    target, readme = docs / "validation.md", docs.parent / "README.md"
+    replace_file(target, page(target.read_text(encoding="utf-8"), groups, known).encode())
+    replace_file(readme, with_excerpts(readme.read_text(encoding="utf-8"), groups, known).encode())
+
+
+def _made() -> dict[str, str]:
+    """Versions, date and machine."""
+    from datetime import UTC, datetime
+    from os import cpu_count
+
+    import dolfinx
+
+    import cutsim
+    from cutsim.base.versions import petsc_version
+
+    today = datetime.now(UTC).date().isoformat()
+    versions = {"cutsim": cutsim.__version__, "dolfinx": dolfinx.__version__, "PETSc": petsc_version()}
+    return {**versions, "on": f"{cpu_count()} cores, {today}"}

@@ -1,0 +1,110 @@
+"""The page on validation, and rows of other pages, made of what was found."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+from cutsim.validation.results import Findings, Result
+from cutsim.validation.rows import Group, Row
+
+#: What stands above this mark in the page is written by hand.
+MARK = "<!-- What follows is written by cutsim validate. -->\n"
+_HEAD = (
+    "| what | expected | computed | error | allowed | source | made by |\n"
+    "|---|---|---|---|---|---|---|\n"
+)  # fmt: skip
+_EXCERPT = re.compile(r"(<!-- validation: ([a-z0-9/, -]+) -->\n).*?(<!-- end of validation -->\n)", re.DOTALL)
+
+
+def page(head: str, groups: Sequence[Group], found: Findings) -> str:
+    """The page, whose head is kept.
+
+    Args:
+        head: The page as it is, or what is to stand above the mark.
+        groups: The rows.
+        found: What was found for them.
+    """
+    parts = [head.split(MARK)[0] + MARK, _summary(groups, found)]
+    for group in groups:
+        parts += [f"## {group.title}", group.text] if group.text else [f"## {group.title}"]
+        parts.append(_HEAD + "".join(_line(row, key, found.results.get(key)) for key, row in keyed([group])))
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def with_excerpts(text: str, groups: Sequence[Group], found: Findings) -> str:
+    """A page in which tables between marks, ``<!-- validation: run/row, … -->``, are made anew.
+
+    Args:
+        text: The page.
+        groups: The rows.
+        found: What was found for them.
+
+    Raises:
+        KeyError: A mark names a row that there is not.
+    """
+    return _EXCERPT.sub(partial(_excerpt, rows=dict(keyed(groups)), found=found), text)
+
+
+def keyed(groups: Sequence[Group]) -> Iterator[tuple[str, Row]]:
+    """All rows with the names of their runs before their own."""
+    for group in groups:
+        for run in group.run:
+            for row in run.row:
+                yield f"{run.name}/{row.name}", row
+
+
+def _excerpt(match: re.Match[str], rows: dict[str, Row], found: Findings) -> str:
+    lines = ["| what | computed | expected | source |", "|---|---|---|---|"]
+    for key in (key.strip() for key in match[2].split(",")):
+        row, result = rows[key], found.results.get(key)
+        cells = ("not run", "") if result is None else (_values(row, result), _number(result.expected, row.unit))
+        lines.append(f"| {row.what} | {cells[0]} | {cells[1]} | {row.source} |")
+    return match[1] + "\n".join(lines) + "\n" + match[3]
+
+
+def _summary(groups: Sequence[Group], found: Findings) -> str:
+    """How many rows are inside, which are not, and what they were made with."""
+    keys = [key for key, _ in keyed(groups)]
+    results = [found.results[key] for key in keys if key in found.results]
+    inside, hours = sum(result.inside for result in results), _total(results) / 60
+    made = ", ".join(f"{name} {value}" for name, value in found.made.items())
+    missing = len(keys) - len(results)
+    words = f"{inside} of {len(keys)} rows are within their tolerance"
+    words += f", {len(results) - inside} are outside" if len(results) > inside else ""
+    words += f", {missing} have not been run" if missing else ""
+    return f"{words}. All runs take {hours:.0f} minutes of processor time. Made with {made or 'nothing yet'}."
+
+
+def _total(results: Sequence[Result]) -> float:
+    """Time of all runs, each counted once."""
+    return sum({result.key.split("/")[0]: result.seconds for result in results}.values())
+
+
+def _line(row: Row, key: str, result: Result | None) -> str:
+    what = f"{row.what}. {row.note}" if row.note else row.what
+    if result is None:
+        return f"| {what} | {_number(row.expected, row.unit)} | not run | | | {row.source} | |\n"
+    allowed = _share(result.tolerance, result.expected).lstrip("+")
+    error = "" if result.error is None else _share(result.error, result.expected)
+    verdict = error if result.inside else f'<span style="color:#c00">**{error} outside: {result.reason}**</span>'
+    size = "" if result.unknowns is None else f", {result.unknowns} unknowns"
+    made = f"`{result.command}`, {result.seconds:.0f} s{size}" + ("" if result.trusted else ", questionable")
+    cells = (what, _number(result.expected, row.unit), _values(row, result), verdict, allowed, row.source, made)
+    return "| " + " | ".join(cells) + " |\n"
+
+
+def _values(row: Row, result: Result) -> str:
+    """The values of all levels, and the order observed."""
+    show: Callable[[float], str] = partial(_number, unit="")
+    values = ", ".join("–" if value is None else show(value) for value in result.values)
+    order = "" if result.order is None else f" (order {result.order:.1f})"
+    return f"{values} {row.unit}".rstrip() + order
+
+
+def _number(value: float, unit: str) -> str:
+    return f"{value:.5g} {unit}".rstrip()
+
+
+def _share(value: float, expected: float) -> str:
+    """A relative error in per cent, an absolute one as it is."""
+    return f"{value:+.2g}" if not expected else f"{100 * value:+.2g} %"

@@ -1,0 +1,163 @@
+"""The validation: rows are read, run, compared and shown, and the committed page is made of the committed results."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from cutsim.commands.main import app
+from cutsim.results.run_files import Column, RunFiles
+from cutsim.validation.page import MARK, keyed, page, with_excerpts
+from cutsim.validation.readings import ReadingError, read_value
+from cutsim.validation.results import Findings
+from cutsim.validation.rows import RowsError, read_rows
+
+ROOT = Path(__file__).parents[1]
+PROGRAM = """
+import json, pathlib, sys
+folder = pathlib.Path(sys.argv[-1])
+folder.mkdir(parents=True, exist_ok=True)
+force = {force} * (1.1 if "--quick" in sys.argv else 1)
+found = {{"force": force, "verdict": "trusted", "wall_time": 2.0, "unknowns": 9}}
+(folder / "summary.json").write_text(json.dumps(found))
+"""
+ROWS = """
+title = "Loads"
+text = "Of a program."
+[[run]]
+name = "press"
+program = "press"
+  [[run.row]]
+  name = "force"
+  what = "Force"
+  value = "2*force"
+  expected = 10
+  unit = "N"
+  tolerance = 0.01
+  source = "a book"
+  quick = { tolerance = 0.2 }
+  [[run.row]]
+  name = "depth"
+  what = "Depth"
+  value = "depth"
+  expected = 1
+  tolerance = 0.01
+  source = "another book"
+"""
+HISTORY = {"x": [0.0, 1.0, 2.0, 3.0], "y": [0.0, 2.0, 4.0, 5.0]}
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """A folder with a program, its rows, and pages."""
+    rows = tmp_path / "tests" / "validation" / "rows"
+    rows.mkdir(parents=True)
+    (rows / "10-loads.toml").write_text(ROWS)
+    (rows.parent / "press.py").write_text(PROGRAM.format(force=5.02))
+    (tmp_path / "docs" / "validation").mkdir(parents=True)
+    (tmp_path / "docs" / "validation.md").write_text(f"# By hand\n\n{MARK}old\n")
+    marks = "<!-- validation: press/force -->\n{}<!-- end of validation -->\n"
+    (tmp_path / "README.md").write_text(marks.format("old\n"))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_a_row_outside_its_tolerance_is_shown_with_its_reason(checkout):
+    result = CliRunner().invoke(app, ["validate"])
+    assert result.exit_code == 1 and "1 of 2 rows are within their tolerance" in result.stdout
+    data = json.loads((checkout / "docs" / "validation" / "results.json").read_text())
+    force, depth = data["results"]
+    assert force["values"] == [10.04] and force["error"] == pytest.approx(0.004) and force["unknowns"] == 9
+    assert depth["values"] == [None] and "depth" in depth["reason"]
+    text = (checkout / "docs" / "validation.md").read_text()
+    assert text.startswith("# By hand") and "old" not in text and "10.04 N" in text and "outside" in text
+    readme = (checkout / "README.md").read_text()
+    assert "| Force | 10.04 N | 10 N | a book |" in readme and "old" not in readme
+
+
+def test_a_quick_validation_has_its_own_tolerance_and_leaves_the_page(checkout):
+    result = CliRunner().invoke(app, ["validate", "--quick"])
+    assert result.exit_code == 0 and "1 of 1 rows" in result.stdout and "11.044" in result.stdout
+    assert "old" in (checkout / "docs" / "validation.md").read_text()
+
+
+def test_runs_that_there_are_not_are_named(checkout):
+    result = CliRunner().invoke(app, ["validate", "--only", "hammer"])
+    assert result.exit_code == 2 and "there are press" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('name = "depth"', 'name = "force"', "the name force is given twice"),
+        ('program = "press"', 'program = "press"\ncase = "dcb"', "not both"),
+        ("tolerance = 0.01", "tolerance = 0", "run.0.row.0.tolerance"),
+        ('unit = "N"', 'units = "N"', "run.0.row.0.units"),
+        ('title = "Loads"', "title = ", "10-loads.toml"),
+    ],
+)
+def test_wrong_rows_are_refused_with_their_place(checkout, old, new, words):
+    (checkout / "tests/validation/rows/10-loads.toml").write_text(ROWS.replace(old, new, 1))
+    with pytest.raises(RowsError, match=words):
+        read_rows(checkout / "tests/validation/rows")
+
+
+def files(**summary):
+    history = {name: Column(name, "", np.array(values)) for name, values in HISTORY.items()}
+    return RunFiles(Path(), summary, history, "", ())
+
+
+@pytest.mark.parametrize(
+    ("expression", "value"),
+    [
+        ("max(y) / given", 2.5),
+        ("at(x, 1.5, y)", 3.0),
+        ("mean(x, 0, 2, y)", 2.0),
+        ("slope(x, 0, 2, y)", 2.0),
+        ("work(x, y)", 8.5),
+        ("last(y) - first(y) + min(x)", 5.0),
+        ("sqrt(sum(x) + 3)", 3.0),
+    ],
+)
+def test_values_are_read_from_histories_and_summaries(expression, value):
+    assert read_value(expression, files(given=2.0)) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("expression", "words"),
+    [
+        ("z", "z"),
+        ("x", "not one finite number"),
+        ("at(x, 7, y)", "never reached"),
+        ("1/0", "division"),
+        ("__import__('os')", "import"),
+        ("mean(x, 5, 6, y)", "fewer than two"),
+    ],
+)
+def test_what_cannot_be_read_is_named(expression, words):
+    with pytest.raises(ReadingError, match=words):
+        read_value(expression, files())
+
+
+def test_a_study_shows_its_order(checkout):
+    text = ROWS.replace('program = "press"', 'case = "dcb"\nstudy = [{ a = 1 }, { a = 2 }]', 1)
+    (checkout / "tests/validation/rows/10-loads.toml").write_text(text)
+    (run,) = read_rows(checkout / "tests/validation/rows")[0].run
+    assert run.levels == [{"a": 1}, {"a": 2}]
+    from cutsim.validation.results import judge
+
+    result = judge(run, run.row[0], [files(force=5.4), files(force=5.1)], quick=False)
+    assert result.order == pytest.approx(2.0) and result.error == pytest.approx(0.02) and not result.inside
+
+
+def test_the_committed_page_is_made_of_the_committed_results():
+    groups = read_rows(ROOT / "tests" / "validation" / "rows")
+    found = Findings.read(ROOT / "docs" / "validation" / "results.json")
+    keys = [key for key, _ in keyed(groups)]
+    assert list(found.results) == [key for key in keys if key in found.results], "results of rows that are gone"
+    text = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+    assert text == page(text, groups, found), "run: cutsim validate --page"
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert readme == with_excerpts(readme, groups, found), "run: cutsim validate --page"
