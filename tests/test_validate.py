@@ -119,10 +119,13 @@ def files(**summary):
         ("work(x, y)", 8.5),
         ("last(y) - first(y) + min(x)", 5.0),
         ("sqrt(sum(x) + 3)", 3.0),
+        ("mu_0_3_peaks_1", 7.0),
     ],
 )
 def test_values_are_read_from_histories_and_summaries(expression, value):
-    assert read_value(expression, files(given=2.0)) == pytest.approx(value, rel=1e-12)
+    assert read_value(expression, files(given=2.0, **{"mu 0.3": {"peaks": [6.0, 7.0]}})) == pytest.approx(
+        value, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(

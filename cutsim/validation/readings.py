@@ -1,6 +1,7 @@
 """Values that are read from the files of a run by expressions such as ``"max(force)"``; no Python is run for them."""
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from math import isfinite
 from typing import Any
 
@@ -18,8 +19,9 @@ class ReadingError(ValueError):
 def read_value(expression: str, files: RunFiles) -> float:
     """Value of an expression of a run.
 
-    Its names are columns of the history, with one number for each step, and numbers of the summary.  Beside the usual
-    operators it may use:
+    Its names are columns of the history, with one number for each step, and numbers of the summary: that of a table
+    within is ``table_name``, where all but letters and digits are underscores, that in a list ``list_0``.  Beside the
+    usual operators it may use:
 
     - ``max(y)``, ``min(y)``, ``first(y)``, ``last(y)``, ``sum(y)``;
     - ``at(x, a, y)``: y where x first reaches a;
@@ -35,9 +37,7 @@ def read_value(expression: str, files: RunFiles) -> float:
     Raises:
         ReadingError: It is no expression, names what the run has not, or its value is no finite number.
     """
-    names = {name: column.values for name, column in files.history.items()} | {
-        name: float(value) for name, value in files.summary.items() if _is_number(value)
-    }
+    names = dict(_numbers("", files.summary)) | {name: column.values for name, column in files.history.items()}
     try:
         value = SimpleEval(functions=dict(FUNCTIONS), names={"pi": np.pi, **names}).eval(expression)
     except Exception as error:  # functions of numpy raise what they like
@@ -47,8 +47,16 @@ def read_value(expression: str, files: RunFiles) -> float:
     return float(value)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+def _numbers(name: str, entry: Any) -> Iterator[tuple[str, float]]:
+    """Numbers of a summary, with the names of the tables and the places in the lists that they are in before them."""
+    if isinstance(entry, Mapping):
+        for key, inner in entry.items():
+            yield from _numbers(f"{name}_{re.sub(r'\W', '_', key)}".lstrip("_"), inner)
+    elif isinstance(entry, list):
+        for place, inner in enumerate(entry):
+            yield from _numbers(f"{name}_{place}", inner)
+    elif isinstance(entry, int | float) and not isinstance(entry, bool):
+        yield name, float(entry)
 
 
 def _at(x: Array, a: float, y: Array) -> float:
