@@ -51,7 +51,8 @@ def _numbers(name: str, entry: Any) -> Iterator[tuple[str, float]]:
     """Numbers of a summary, with the names of the tables and the places in the lists that they are in before them."""
     if isinstance(entry, Mapping):
         for key, inner in entry.items():
-            yield from _numbers(f"{name}_{re.sub(r'\W', '_', key)}".lstrip("_"), inner)
+            own = re.sub(r"\W", "_", key)
+            yield from _numbers(f"{name}_{own}" if name else own, inner)
     elif isinstance(entry, list):
         for place, inner in enumerate(entry):
             yield from _numbers(f"{name}_{place}", inner)
