@@ -119,7 +119,7 @@ def files(**summary):
         ("work(x, y)", 8.5),
         ("last(y) - first(y) + min(x)", 5.0),
         ("sqrt(sum(x) + 3)", 3.0),
-        ("mu_0_3_peaks_1", 7.0),
+        ("summary('mu 0.3', 'peaks', 1)", 7.0),
     ],
 )
 def test_values_are_read_from_histories_and_summaries(expression, value):
@@ -132,6 +132,7 @@ def test_values_are_read_from_histories_and_summaries(expression, value):
     ("expression", "words"),
     [
         ("z", "z"),
+        ("summary('given')", "given"),
         ("x", "not one finite number"),
         ("at(x, 7, y)", "never reached"),
         ("1/0", "division"),

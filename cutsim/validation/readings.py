@@ -1,7 +1,7 @@
 """Values that are read from the files of a run by expressions such as ``"max(force)"``; no Python is run for them."""
 
-import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from math import isfinite
 from typing import Any
 
@@ -19,10 +19,10 @@ class ReadingError(ValueError):
 def read_value(expression: str, files: RunFiles) -> float:
     """Value of an expression of a run.
 
-    Its names are columns of the history, with one number for each step, and numbers of the summary: that of a table
-    within is ``table_name``, where all but letters and digits are underscores, that in a list ``list_0``.  Beside the
-    usual operators it may use:
+    Its names are columns of the history, with one number for each step, and numbers of the summary.  Beside the usual
+    operators it may use:
 
+    - ``summary('a', 'b', 0)``: a number that is deeper in the summary;
     - ``max(y)``, ``min(y)``, ``first(y)``, ``last(y)``, ``sum(y)``;
     - ``at(x, a, y)``: y where x first reaches a;
     - ``mean(x, a, b, y)``: mean of y while x goes from a to b;
@@ -37,9 +37,11 @@ def read_value(expression: str, files: RunFiles) -> float:
     Raises:
         ReadingError: It is no expression, names what the run has not, or its value is no finite number.
     """
-    names = dict(_numbers("", files.summary)) | {name: column.values for name, column in files.history.items()}
+    numbers = {name: float(value) for name, value in files.summary.items() if _is_number(value)}
+    names = {"pi": np.pi, **numbers, **{name: column.values for name, column in files.history.items()}}
+    functions = {**FUNCTIONS, "summary": partial(_entry, files.summary)}
     try:
-        value = SimpleEval(functions=dict(FUNCTIONS), names={"pi": np.pi, **names}).eval(expression)
+        value = SimpleEval(functions=functions, names=names).eval(expression)
     except Exception as error:  # functions of numpy raise what they like
         raise ReadingError(f"{expression!r} cannot be evaluated: {error}") from None
     if np.ndim(value) or not isfinite(value):
@@ -47,17 +49,17 @@ def read_value(expression: str, files: RunFiles) -> float:
     return float(value)
 
 
-def _numbers(name: str, entry: Any) -> Iterator[tuple[str, float]]:
-    """Numbers of a summary, with the names of the tables and the places in the lists that they are in before them."""
-    if isinstance(entry, Mapping):
-        for key, inner in entry.items():
-            own = re.sub(r"\W", "_", key)
-            yield from _numbers(f"{name}_{own}" if name else own, inner)
-    elif isinstance(entry, list):
-        for place, inner in enumerate(entry):
-            yield from _numbers(f"{name}_{place}", inner)
-    elif isinstance(entry, int | float) and not isinstance(entry, bool):
-        yield name, float(entry)
+def _entry(summary: Any, *keys: str | float) -> float:
+    """A number of the summary, by the names of tables and the places in lists that lead to it."""
+    for key in keys:
+        summary = summary[int(key) if isinstance(summary, list) else str(key)]
+    if not _is_number(summary):
+        raise ValueError(f"summary{keys} is no number")
+    return float(summary)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _at(x: Array, a: float, y: Array) -> float:
