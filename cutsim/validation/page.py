@@ -13,7 +13,7 @@ _HEAD = (
     "| what | expected | computed | error | allowed | source | made by |\n"
     "|---|---|---|---|---|---|---|\n"
 )  # fmt: skip
-_EXCERPT = re.compile(r"(<!-- validation: ([a-z0-9/, -]+) -->\n).*?(<!-- end of validation -->\n)", re.DOTALL)
+_EXCERPT = re.compile(r"(<!-- validation: ([A-Za-z0-9/, -]+) -->\n).*?(<!-- end of validation -->\n)", re.DOTALL)
 
 
 def page(head: str, groups: Sequence[Group], found: Findings) -> str:

@@ -44,8 +44,10 @@ def read_value(expression: str, files: RunFiles) -> float:
         value = SimpleEval(functions=functions, names=names).eval(expression)
     except Exception as error:  # functions of numpy raise what they like
         raise ReadingError(f"{expression!r} cannot be evaluated: {error}") from None
-    if np.ndim(value) or not isfinite(value):
-        raise ReadingError(f"{expression!r} is {value!r}, and not one finite number")
+    if np.ndim(value):
+        raise ReadingError(f"{expression!r} is a number for each step, and not one")
+    if not isfinite(value):
+        raise ReadingError(f"{expression!r} is {value}, and not finite")
     return float(value)
 
 
