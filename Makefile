@@ -2,7 +2,7 @@
 # DOLFINX=wheel|system and PYTHON=/path/to/python3 choose what it takes; docs/install.md says how.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo validation test test-mpi bench lint api docs dist clean always
+.PHONY: help setup demo validation validate test test-mpi bench lint api docs dist clean always
 
 NAME ?= blade
 JOBS ?= $(shell nproc)
@@ -34,6 +34,9 @@ demo: $(STAMP) ## run the lesson NAME, or else the validation program: NAME=blad
 validation: $(STAMP) ## run a validation program: NAME=blade QUICK=1 ARGS="--friction .1"; writes results/validation/NAME
 	@test -f $(PROGRAM) || { echo "no validation program '$(NAME)'; there are:" $(call names,tests/validation) >&2; exit 2; }
 	$(RUN) $(PROGRAM) $(REDUCED) $(ARGS)
+
+validate: $(STAMP) ## run what compares results with references, and make its page: ARGS="--quick", "--only dcb"
+	.venv/bin/cutsim validate -j $(JOBS) $(ARGS)
 
 test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those marked mpi on 2 and 3 ranks
 	scripts/run -n 1 -m pytest -n $(JOBS) --dist loadfile tests $(ARGS)

@@ -18,7 +18,7 @@ SOURCES = Path(cutsim.__file__).parent
 # a package imports from those before it
 PACKAGES = (
     "base", "readers", "fields", "solvers", "materials", "bodies", "interface", "pairs", "tools", "heat", "analysis",
-    "results", "studies", "identify", "cases", "commands",
+    "results", "studies", "identify", "cases", "validation", "commands",
 )  # fmt: skip
 
 
