@@ -6,6 +6,7 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from simpleeval import SimpleEval
 
 from cutsim.base.arrays import Array
@@ -74,7 +75,7 @@ def _at(x: Array, a: float, y: Array) -> float:
     return float(y[i] + share * (y[i + 1] - y[i]))
 
 
-def _within(x: Array, a: float, b: float) -> Array:
+def _within(x: Array, a: float, b: float) -> NDArray[np.bool_]:
     """Steps at which x lies between a and b."""
     inside = (x >= min(a, b)) & (x <= max(a, b))
     if np.count_nonzero(inside) < 2:

@@ -65,9 +65,9 @@ def judge(run: Run, row: Row, levels: Sequence[RunFiles], *, quick: bool) -> Res
     for files in levels:
         try:
             values.append(read_value(row.value, files))
-        except ReadingError as error:
+        except ReadingError as unreadable:
             values.append(None)
-            reason = str(error)
+            reason = str(unreadable)
     last = values[-1] if values else None
     error = None if last is None else (last - expected) / abs(expected or 1.0)
     if error is not None and abs(error) > tolerance:
