@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import chain, count
 from typing import Any, Literal
 
@@ -209,9 +210,9 @@ class Mechanics(Balance[Term, Support]):
         self._residual.trial, self._rate_forces.trial, self._moved.trial = residual, rate_forces, True
         self._audit.trial = self.audit.advance(work, self._energies())
 
-    @property
+    @cached_property
     def path(self) -> EquilibriumPath:
-        """The path of its equilibria. Collective."""
+        """The path of its equilibria. Making it is collective."""
         return EquilibriumPath(self, self._settle, self._lost)
 
     def _lost(self) -> float:
