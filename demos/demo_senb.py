@@ -94,18 +94,21 @@ with Recording("results/senb", mechanics, 1.0, title="senb", **options) as recor
 # ## Compare
 #
 # The peak stays below that of a sharp crack; halve the length of the zone (and of the elements) to see it come closer.
-# $J$ rises to $G_c$ and stays, and the energy that was dissipated is $G_c$ times the broken area.
+# $J$ rises to $G_c$ and stays while the crack runs.  What the beam then gives, the work of the load without what is stored
+# in the beam and its bond, is $G_c$ times the area that breaks.
 
 from cutsim import Curve, draw_stress, plot_curves
 
 history = recording.columns()
 P = -history["load_force"]
 P_c = BentBeam(W, 1.0).critical_load(G_c, a, modulus)
+running = history["J"] > 0.99 * G_c
+given = history["work_external"] - history["energy_strain"] - history["energy_cohesive_stored"]
 result = {
     "peak_load_per_thickness": P.max(),
     "peak_over_closed_form": P.max() / P_c,
     "largest_J_over_toughness": history["J"].max() / G_c,
-    "dissipation_over_toughness": history["energy_fracture"][-1] / (history["crack_broken"][-1] * G_c),
+    "given_per_area_over_toughness": np.ptp(given[running]) / np.ptp(history["crack_broken"][running]) / G_c,
 }
 recording.summary(result)
 draw_stress("results/senb/beam.png", body, crack, title="The crack runs upwards from the notch")
@@ -115,4 +118,4 @@ if MPI.COMM_WORLD.rank == 0:
     plot_curves("results/senb/load.png", [Curve(way, P)], references={"sharp crack": P_c}, **labels)
     labels["ylabel"] = "J over toughness"
     plot_curves("results/senb/J.png", [Curve(way, history["J"] / G_c)], references={"running crack": 1.0}, **labels)
-assert abs(result["largest_J_over_toughness"] - 1) < 0.01 and abs(result["dissipation_over_toughness"] - 1) < 0.01
+assert abs(result["largest_J_over_toughness"] - 1) < 0.01 and abs(result["given_per_area_over_toughness"] - 1) < 0.01

@@ -1,6 +1,7 @@
 """Hooks and fixtures of all tests. What they share otherwise is in the package helpers."""
 
 import gc
+import logging
 from itertools import groupby
 
 import pytest
@@ -38,6 +39,16 @@ def _nothing_is_left():
     """What a test has dropped is freed before the next one: MPICH has some two thousand communicators a process."""
     yield
     gc.collect()
+
+
+@pytest.fixture(autouse=True)
+def _messages():
+    """The command sets up the messages of its process: what they were before comes back."""
+    logger = logging.getLogger("cutsim")
+    handlers, propagate, level = list(logger.handlers), logger.propagate, logger.level
+    yield
+    logger.handlers[:], logger.propagate = handlers, propagate
+    logger.setLevel(level)
 
 
 @pytest.fixture

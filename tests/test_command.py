@@ -3,7 +3,6 @@
 import csv
 import errno
 import json
-import logging
 import os
 import signal
 import subprocess
@@ -33,16 +32,6 @@ from cutsim.results.output import read_history
 runner = CliRunner()
 COARSE = [0, 1, 2, 3, 4]
 NAMES = [name for commands in COMMANDS.values() for name in commands]
-
-
-@pytest.fixture(autouse=True)
-def _messages():
-    """The command sets up the messages of its process: what they were before comes back."""
-    logger = logging.getLogger("cutsim")
-    handlers, propagate, level = list(logger.handlers), logger.propagate, logger.level
-    yield
-    logger.handlers[:], logger.propagate = handlers, propagate
-    logger.setLevel(level)
 
 
 def start(*arguments, **options):
