@@ -11,7 +11,7 @@ from cutsim.commands.main import app
 from cutsim.results.run_files import Column, RunFiles
 from cutsim.validation.page import MARK, keyed, page, with_excerpts
 from cutsim.validation.readings import ReadingError, read_value
-from cutsim.validation.results import Findings
+from cutsim.validation.results import Findings, Level, judge
 from cutsim.validation.rows import RowsError, read_rows
 
 ROOT = Path(__file__).parents[1]
@@ -68,8 +68,9 @@ def test_a_row_outside_its_tolerance_is_shown_with_its_reason(checkout):
     result = CliRunner().invoke(app, ["validate"])
     assert result.exit_code == 1 and "1 of 2 rows are within their tolerance" in result.stdout
     data = json.loads((checkout / "docs" / "validation" / "results.json").read_text())
-    force, depth = data["results"]
+    force, depth = data
     assert force["values"] == [10.04] and force["error"] == pytest.approx(0.004) and force["unknowns"] == 9
+    assert force["trusted"] and 0 < force["seconds"] < 10 and "dolfinx" in force["made"]
     assert depth["values"] == [None] and "depth" in depth["reason"]
     text = (checkout / "docs" / "validation.md").read_text()
     assert text.startswith("# By hand") and "old" not in text and "10.04 N" in text and "outside" in text
@@ -107,6 +108,10 @@ def test_wrong_rows_are_refused_with_their_place(checkout, old, new, words):
 def files(**summary):
     history = {name: Column(name, "", np.array(values)) for name, values in HISTORY.items()}
     return RunFiles(Path(), summary, history, "", ())
+
+
+def level(**summary):
+    return Level(files(**summary), 0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -151,10 +156,23 @@ def test_a_study_shows_its_order(checkout):
     (checkout / "tests/validation/rows/10-loads.toml").write_text(text)
     (run,) = read_rows(checkout / "tests/validation/rows")[0].run
     assert run.levels == [{"a": 1}, {"a": 2}]
-    from cutsim.validation.results import judge
-
-    result = judge(run, run.row[0], [files(force=5.4), files(force=5.1)], quick=False)
+    result = judge(run, run.row[0], [level(force=5.4), level(force=5.1)], "today", quick=False)
     assert result.order == pytest.approx(2.0) and result.error == pytest.approx(0.02) and not result.inside
+    assert result.values == (10.8, 10.2) and result.seconds == 2.0
+
+
+def test_a_study_of_a_program_is_a_list_of_values(checkout):
+    text = ROWS.replace('value = "2*force"', 'value = ["coarse", "fine"]', 1)
+    (checkout / "tests/validation/rows/10-loads.toml").write_text(text)
+    (run,) = read_rows(checkout / "tests/validation/rows")[0].run
+    result = judge(run, run.row[0], [level(coarse=10.2, fine=10.05)], "today", quick=False)
+    assert result.values == (10.2, 10.05) and result.order == pytest.approx(2.0)
+    result = judge(run, run.row[0], [level(coarse=10.2)], "today", quick=True)
+    assert result.values == (10.2,) and result.inside and not result.reason, (
+        "a quick program makes the coarse mesh only"
+    )
+    result = judge(run, run.row[0], [level(coarse=10.2)], "today", quick=False)
+    assert not result.inside and "fine" in result.reason
 
 
 def test_the_committed_page_is_made_of_the_committed_results():

@@ -79,12 +79,6 @@ class Simulation:
         """The mechanical problem."""
         return self.problem if isinstance(self.problem, Mechanics) else self.problem.mechanics
 
-    @property
-    def unknowns(self) -> int:
-        """Number of unknowns of the mechanical problem."""
-        space = self.problem.state.V
-        return int(space.dofmap.index_map.size_global * space.dofmap.index_map_bs)
-
     def draw(self, path: Path | str) -> None:
         """Draw the set-up: mesh, cracks, tools where they begin, and what is held. Collective.
 

@@ -184,7 +184,6 @@ def _facts(simulation: Simulation, recording: Recording, seconds: float) -> dict
         "title": simulation.title,
         "curve": list(simulation.curve),
         **_headline(simulation, recording),
-        "unknowns": simulation.unknowns,
         "mesh": mesh_sizes(simulation),
         "ranks": simulation.problem.state.mesh.comm.size,
         "wall_time": seconds,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import resource
 import shutil
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -61,6 +63,33 @@ def command(
     raise typer.Exit(Ending.QUESTIONABLE if outside else Ending.TRUSTED)
 
 
+@dataclass(frozen=True)
+class _TimedJob(Job):
+    """A job that notes its processor time."""
+
+    def run(self) -> int:
+        """As that of a job."""
+        before = _processor_time()
+        status = super().run()
+        self._note.write_text(f"{_processor_time() - before:.2f}", encoding="utf-8")
+        return status
+
+    @property
+    def _note(self) -> Path:
+        return self.folder / "seconds.txt"
+
+    @property
+    def seconds(self) -> float:
+        """Processor time of its processes [s]; nan if it has not ended."""
+        return float(self._note.read_text(encoding="utf-8")) if self._note.exists() else float("nan")
+
+
+def _processor_time() -> float:
+    """That of all processes which this one has started and which have ended [s]."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
+
+
 def _short(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
@@ -85,7 +114,7 @@ def _chosen(groups: Sequence[Group], only: Sequence[str], *, quick: bool) -> lis
 def _results(runs: Sequence[Run], folder: Path, jobs: int, *, quick: bool, screen: Console) -> list[Result]:
     """Run everything that was chosen, and judge what was not interrupted."""
     from cutsim.results.run_files import RunFiles
-    from cutsim.validation.results import judge
+    from cutsim.validation.results import Level, judge
 
     base = Path("results/validation") / ("quick" if quick else "full")
     levels = {run.name: _jobs(run, folder, base, quick=quick) for run in runs}
@@ -100,28 +129,29 @@ def _results(runs: Sequence[Run], folder: Path, jobs: int, *, quick: bool, scree
         shutil.rmtree(job.folder, ignore_errors=True)
     if ahead:
         Runner(base / "jobs", jobs, "local", {}).run(ahead, done)
-    found = list["Result"]()
+    found, made = list["Result"](), _made() if runs else ""
     for run in runs:
-        if all(statuses[job.folder] != Ending.INTERRUPTED for job in levels[run.name]):
-            files = [RunFiles.read(job.folder) for job in levels[run.name]]
-            found += [judge(run, row, files, quick=quick) for row in run.row]
+        jobs_of = levels[run.name]
+        if all(statuses[job.folder] != Ending.INTERRUPTED for job in jobs_of):
+            ended = [Level(RunFiles.read(job.folder), statuses[job.folder], job.seconds) for job in jobs_of]
+            found += [judge(run, row, ended, made, quick=quick) for row in run.row]
     return found
 
 
-def _jobs(run: Run, folder: Path, base: Path, *, quick: bool) -> list[Job]:
+def _jobs(run: Run, folder: Path, base: Path, *, quick: bool) -> list[_TimedJob]:
     """The commands of a run, one for each level of its study; only the coarsest in a quick validation."""
     reduced = ["--quick"] if quick else []
     if run.program:
         target = base / run.name
         program = str(folder / f"{run.program}.py")
-        return [Job(target, (program, *run.arguments, *reduced, "--out", str(target)))]
+        return [_TimedJob(target, (program, *run.arguments, *reduced, "--out", str(target)))]
     levels = run.levels[:1] if quick else run.levels
-    found = list[Job]()
+    found = list[_TimedJob]()
     for number, changes in enumerate(levels, start=1):
         target = base / (run.name if len(levels) == 1 else f"{run.name}-{number}")
         sets = [part for key, value in changes.items() for part in ("--set", f"{key}={value}")]
         arguments = ("-m", "cutsim", "run", run.case, *sets, *reduced, "-o", str(target), "--overwrite")
-        found.append(Job(target, arguments))
+        found.append(_TimedJob(target, arguments))
     return found
 
 
@@ -134,14 +164,14 @@ def _write(groups: Sequence[Group], found: Sequence[Result], docs: Path) -> None
     data = docs / "validation" / "results.json"
     known = Findings.read(data)
     if found:
-        known = known.with_results(found, _made(), [key for key, _ in keyed(groups)])
+        known = known.with_results(found, [key for key, _ in keyed(groups)])
         known.write(data)
     target, readme = docs / "validation.md", docs.parent / "README.md"
     replace_file(target, page(target.read_text(encoding="utf-8"), groups, known).encode())
     replace_file(readme, with_excerpts(readme.read_text(encoding="utf-8"), groups, known).encode())
 
 
-def _made() -> dict[str, str]:
+def _made() -> str:
     """Versions, date and machine."""
     from datetime import UTC, datetime
     from os import cpu_count
@@ -153,4 +183,4 @@ def _made() -> dict[str, str]:
 
     today = datetime.now(UTC).date().isoformat()
     versions = {"cutsim": cutsim.__version__, "dolfinx": dolfinx.__version__, "PETSc": petsc_version()}
-    return {**versions, "on": f"{cpu_count()} cores, {today}"}
+    return ", ".join([today, *(f"{name} {version}" for name, version in versions.items()), f"{cpu_count()} cores"])

@@ -125,6 +125,11 @@ class State:
         """Number of the step (trial)."""
         return self._clock.trial.number
 
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns of the displacement on all ranks."""
+        return int(self.V.dofmap.index_map.size_global * self.V.dofmap.index_map_bs)
+
     def begin(self, time: float) -> None:
         """Start a step that ends at `time`; the trial displacement starts from the committed one."""
         old = self._clock.committed

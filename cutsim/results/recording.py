@@ -172,7 +172,8 @@ class Recording:
 
     def _summary(self) -> dict[str, Any]:
         state = self.problem.state
-        return {**state.verdict.record(), "time": state.time_old, "until": self._until, **self._values}
+        facts = {"time": state.time_old, "until": self._until, "unknowns": state.unknowns}
+        return {**state.verdict.record(), **facts, **self._values}
 
     @property
     def complete(self) -> bool:

@@ -1,6 +1,7 @@
 """The page on validation, and rows of other pages, made of what was found."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
@@ -10,7 +11,7 @@ from cutsim.validation.rows import Group, Row
 #: What stands above this mark in the page is written by hand.
 MARK = "<!-- What follows is written by cutsim validate. -->\n"
 _HEAD = (
-    "| what | expected | computed | error | allowed | source | made by |\n"
+    "| what | expected | computed, coarse to fine | error | allowed | source | run |\n"
     "|---|---|---|---|---|---|---|\n"
 )  # fmt: skip
 _EXCERPT = re.compile(r"(<!-- validation: ([A-Za-z0-9/, -]+) -->\n).*?(<!-- end of validation -->\n)", re.DOTALL)
@@ -66,13 +67,13 @@ def _summary(groups: Sequence[Group], found: Findings) -> str:
     """How many rows are inside, which are not, and what they were made with."""
     keys = [key for key, _ in keyed(groups)]
     results = [found.results[key] for key in keys if key in found.results]
-    inside, hours = sum(result.inside for result in results), _total(results) / 60
-    made = ", ".join(f"{name} {value}" for name, value in found.made.items())
-    missing = len(keys) - len(results)
+    inside, minutes = sum(result.inside for result in results), _total(results) / 60
+    missing, made = len(keys) - len(results), Counter(result.made for result in results)
     words = f"{inside} of {len(keys)} rows are within their tolerance"
     words += f", {len(results) - inside} are outside" if len(results) > inside else ""
     words += f", {missing} have not been run" if missing else ""
-    return f"{words}. All runs take {hours:.0f} minutes of processor time. Made with {made or 'nothing yet'}."
+    versions = "; ".join(f"{number} on {words}" for words, number in sorted(made.items())) or "none"
+    return f"{words}. All runs together take {minutes:.0f} minutes of processor time. Rows were made: {versions}."
 
 
 def _total(results: Sequence[Result]) -> float:
@@ -88,8 +89,8 @@ def _line(row: Row, key: str, result: Result | None) -> str:
     error = "" if result.error is None else _share(result.error, result.expected)
     verdict = error if result.inside else f'<span style="color:#c00">**{error} outside: {result.reason}**</span>'
     size = "" if result.unknowns is None else f", {result.unknowns} unknowns"
-    made = f"`{result.command}`, {result.seconds:.0f} s{size}" + ("" if result.trusted else ", questionable")
-    cells = (what, _number(result.expected, row.unit), _values(row, result), verdict, allowed, row.source, made)
+    run = f"`{key.split('/')[0]}`, {result.seconds:.0f} s{size}" + ("" if result.trusted else ", questionable")
+    cells = (what, _number(result.expected, row.unit), _values(row, result), verdict, allowed, row.source, run)
     return "| " + " | ".join(cells) + " |\n"
 
 

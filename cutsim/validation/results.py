@@ -8,9 +8,31 @@ from pathlib import Path
 from typing import Any, Self
 
 from cutsim.base.files import replace_file
+from cutsim.results.folder import SUMMARY
 from cutsim.results.run_files import RunFiles
 from cutsim.validation.readings import ReadingError, read_value
 from cutsim.validation.rows import Row, Run
+
+
+@dataclass(frozen=True)
+class Level:
+    """A run of a study, after it has ended.
+
+    Attributes:
+        files: What it has left.
+        status: How it has ended: 0 if a case was trusted, or the checks of a program have held.
+        seconds: Its processor time, on all ranks [s].
+    """
+
+    files: RunFiles
+    status: int
+    seconds: float
+
+    @property
+    def unknowns(self) -> int | None:
+        """Unknowns of the largest problem that it has solved; None if it does not say."""
+        found = (RunFiles.read(path.parent).summary.get("unknowns") for path in self.files.folder.rglob(SUMMARY))
+        return max((number for number in found if isinstance(number, int)), default=None)
 
 
 @dataclass(frozen=True)
@@ -25,10 +47,10 @@ class Result:
         tolerance: What is allowed of it.
         order: Observed order in the size of mesh or step; None without a study.
         reason: Why it is outside its tolerance or missing, in words; empty if it is inside.
-        trusted: Whether the run was trusted by its own verdict.
-        seconds: Time of the run on all ranks, all levels together [s].
-        unknowns: Unknowns of the last level; None if it is not known.
-        command: Command that runs it alone.
+        trusted: Whether the run was trusted by its own verdict, or its program's checks have held.
+        seconds: Processor time of the run, all levels together [s].
+        unknowns: Unknowns of the largest problem; None if it is not known.
+        made: Versions, date and machine that it was made with.
     """
 
     key: str
@@ -41,7 +63,7 @@ class Result:
     trusted: bool
     seconds: float
     unknowns: int | None
-    command: str
+    made: str
 
     @property
     def inside(self) -> bool:
@@ -49,38 +71,46 @@ class Result:
         return self.error is not None and abs(self.error) <= self.tolerance
 
 
-def judge(run: Run, row: Row, levels: Sequence[RunFiles], *, quick: bool) -> Result:
+def judge(run: Run, row: Row, levels: Sequence[Level], made: str, *, quick: bool) -> Result:
     """Compare what runs have left with the reference of a row.
 
     Args:
         run: The run.
         row: The row.
-        levels: Files of each level, the one that counts last.
+        levels: Its levels, the one that counts last.
+        made: Versions, date and machine.
         quick: Whether the tolerance of a quick validation holds.
     """
     other = row.quick if quick else None
     expected = row.expected if other is None or other.expected is None else other.expected
     tolerance = row.tolerance if other is None else other.tolerance
+    values, reason = _values(row.value if other is None or other.value is None else other.value, levels)
+    if quick and any(value is not None for value in values):
+        values = [value for value in values if value is not None]  # those of finer meshes are not made
+    error = None if values[-1] is None else (values[-1] - expected) / abs(expected or 1.0)
+    if error is not None:
+        share = f"{error:+.2%} off, {tolerance:.2%} allowed" if expected else f"{error:.3g}, {tolerance:.3g} allowed"
+        reason = share if abs(error) > tolerance else ""
+    return Result(
+        key=f"{run.name}/{row.name}", values=tuple(values), expected=expected, error=error, tolerance=tolerance,
+        order=_order(values, expected, run.refinement), reason=reason,
+        trusted=all(level.status == 0 for level in levels), seconds=round(sum(level.seconds for level in levels), 2),
+        unknowns=levels[-1].unknowns, made=made,
+    )  # fmt: skip
+
+
+def _values(value: str | list[str], levels: Sequence[Level]) -> tuple[list[float | None], str]:
+    """The value of each level, or each value of a program, and why the last one could not be read."""
     values, reason = list[float | None](), ""
-    for files in levels:
+    several = [(one, levels[-1]) for one in value] if isinstance(value, list) else [(value, level) for level in levels]
+    for expression, level in several:
         try:
-            values.append(read_value(row.value, files))
+            values.append(read_value(expression, level.files))
+            reason = ""
         except ReadingError as unreadable:
             values.append(None)
             reason = str(unreadable)
-    last = values[-1] if values else None
-    error = None if last is None else (last - expected) / abs(expected or 1.0)
-    if error is not None and abs(error) > tolerance:
-        reason = f"{error:+.2%} off, {tolerance:.2%} allowed" if expected else f"{error:.3g}, {tolerance:.3g} allowed"
-    elif error is None and not reason:
-        reason = "the run has left nothing"
-    summary: Mapping[str, Any] = levels[-1].summary if levels else {}
-    return Result(
-        key=f"{run.name}/{row.name}", values=tuple(values), expected=expected, error=error, tolerance=tolerance,
-        order=_order(values, expected, run.refinement), reason=reason, trusted=summary.get("verdict") == "trusted",
-        seconds=round(sum(map(_seconds, levels)), 1), unknowns=_unknowns(summary),
-        command=f"cutsim validate --only {run.name}",
-    )  # fmt: skip
+    return values, reason
 
 
 def _order(values: Sequence[float | None], expected: float, ratio: float) -> float | None:
@@ -93,46 +123,34 @@ def _order(values: Sequence[float | None], expected: float, ratio: float) -> flo
     return log(abs(before - expected) / abs(last - expected)) / log(ratio)
 
 
-def _seconds(files: RunFiles) -> float:
-    return float(files.summary.get("wall_time", 0.0) * files.summary.get("ranks", 1))
-
-
-def _unknowns(summary: Mapping[str, Any]) -> int | None:
-    mesh = summary.get("mesh")
-    found = summary.get("unknowns", mesh.get("unknowns") if isinstance(mesh, Mapping) else None)
-    return found if isinstance(found, int) else None
-
-
 @dataclass(frozen=True)
 class Findings:
-    """Results of a validation, with what it was made with.
+    """Results of a validation.
 
     Attributes:
         results: The results by their keys.
-        made: Versions, date, machine and whether it was quick: what a reader needs to make it again.
     """
 
     results: Mapping[str, Result]
-    made: Mapping[str, str]
 
     @classmethod
     def read(cls, path: Path) -> Self:
         """Read a file that `write` has written; nothing is found yet if there is none."""
         if not path.exists():
-            return cls({}, {})
-        data = json.loads(path.read_text(encoding="utf-8"))
-        results = (Result(**{**entry, "values": tuple(entry["values"])}) for entry in data["results"])
-        return cls({result.key: result for result in results}, data["made"])
+            return cls({})
+        entries = json.loads(path.read_text(encoding="utf-8"))
+        results = (Result(**{**entry, "values": tuple(entry["values"])}) for entry in entries)
+        return cls({result.key: result for result in results})
 
     def write(self, path: Path) -> None:
         """Write the file in one go."""
-        data = {"made": dict(self.made), "results": [_rounded(asdict(result)) for result in self.results.values()]}
-        replace_file(path, (json.dumps(data, indent=1, ensure_ascii=False) + "\n").encode())
+        entries = [_rounded(asdict(result)) for result in self.results.values()]
+        replace_file(path, (json.dumps(entries, indent=1, ensure_ascii=False) + "\n").encode())
 
-    def with_results(self, results: Iterable[Result], made: Mapping[str, str], order: Sequence[str]) -> Self:
+    def with_results(self, results: Iterable[Result], order: Sequence[str]) -> Self:
         """The same with some results replaced, those of rows that are gone left out, in the order of some keys."""
         known = {**self.results, **{result.key: result for result in results}}
-        return type(self)({key: known[key] for key in order if key in known}, made)
+        return type(self)({key: known[key] for key in order if key in known})
 
 
 def _rounded(value: Any) -> Any:

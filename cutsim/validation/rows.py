@@ -21,10 +21,12 @@ class Quick(_Table):
     Attributes:
         tolerance: Allowed relative error [–], or absolute one where zero is expected.
         expected: Expected value, if the quick problem is another one.
+        value: What is read, if it has another name there.
     """
 
     tolerance: Annotated[float, Field(gt=0)]
     expected: float | None = None
+    value: _Text | None = None
 
 
 class Row(_Table):
@@ -33,7 +35,8 @@ class Row(_Table):
     Attributes:
         name: Its name within the run.
         what: What it is, for a reader of the page.
-        value: What is read from the run, see `Readings`.
+        value: What is read from the run, see `cutsim.validation.readings`; a list if a program has made a study, from
+            the coarsest mesh or step to the finest, which counts.
         expected: The reference.
         tolerance: Allowed relative error [–], or absolute one where zero is expected.
         unit: Unit of both; empty for a pure number.
@@ -44,7 +47,7 @@ class Row(_Table):
 
     name: _Name
     what: _Text
-    value: _Text
+    value: _Text | Annotated[list[_Text], Field(min_length=2)]
     expected: float
     tolerance: Annotated[float, Field(gt=0)]
     unit: str = ""
@@ -62,7 +65,7 @@ class Run(_Table):
         program: name of a validation program.
         set: Keys of the case that are changed.
         arguments: Arguments of the program.
-        study: Further changes, one table for each mesh or step, from the coarsest to the finest, whose value counts.
+        study: Further changes, one table for each mesh or step, from the coarsest to the finest, which counts.
         refinement: Ratio of the sizes of neighbours in the study.
         row: The rows.
     """
@@ -84,6 +87,8 @@ class Run(_Table):
             raise ValueError("arguments are those of a program; a case has set")
         if self.program and (self.set or self.study):
             raise ValueError("set and study are those of a case; a program has arguments")
+        if self.case and any(isinstance(row.value, list) for row in self.row):
+            raise ValueError("a case has one value a run; its study makes several")
         return self
 
     @property
