@@ -94,8 +94,8 @@ with Recording("results/senb", mechanics, 1.0, title="senb", **options) as recor
 # ## Compare
 #
 # The peak stays below that of a sharp crack; halve the length of the zone (and of the elements) to see it come closer.
-# $J$ rises to $G_c$ and stays while the crack runs.  What the beam then gives, the work of the load without what is stored
-# in the beam and its bond, is $G_c$ times the area that breaks.
+# $J$ rises to $G_c$ and stays while the crack runs.  What the beam then gives, the work of the load without what is
+# stored in the beam and its bond, is $G_c$ times the area that breaks.
 
 from cutsim import Curve, draw_stress, plot_curves
 

@@ -35,7 +35,7 @@ GROUPS = {
     "Start from a ready-made problem": ("studies", "cutsim.studies"),
     "Find parameters from measurements": ("identify", "cutsim.identify"),
     "Read and run case files": ("cases", "cutsim.cases"),
-    "Write a term of your own": ("base", "cutsim.base.terms"),
+    "Write a term of your own": ("base", "cutsim.base.terms", "cutsim.base.borders"),
 }
 
 
@@ -86,7 +86,7 @@ def line(thing):
 
 def is_protocol(thing):
     """Whether something is a protocol or the term that others derive from."""
-    return getattr(thing, "_is_protocol", False) or thing.__module__ == "cutsim.base.terms"
+    return getattr(thing, "_is_protocol", False) or thing.__module__ in GROUPS["Write a term of your own"]
 
 
 def inherited_promises():

@@ -7,7 +7,8 @@ from mpi4py import MPI
 
 from cutsim.analysis.mobility import free_motion
 from cutsim.base.arrays import Array
-from cutsim.base.terms import Advising, Body, Bordered, Term, offering
+from cutsim.base.borders import Bordered
+from cutsim.base.terms import Advising, Body, Term, offering
 from cutsim.bodies.inertia import Inertia
 from cutsim.bodies.loads import Support
 from cutsim.bodies.schemes import Scheme

@@ -13,12 +13,13 @@ from petsc4py import PETSc
 
 from cutsim.base.arrays import Array
 from cutsim.base.assembly import summed
+from cutsim.base.borders import BorderBlocks
 from cutsim.base.checks import count, finite, require, require_number, require_numbers
 from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import TimeFunction
 from cutsim.base.rotations import rotation_derivatives
 from cutsim.base.signatures import checked
-from cutsim.base.terms import BorderBlocks, Columns, Term
+from cutsim.base.terms import Columns, Term
 from cutsim.bodies.machine import TURNS, Machine
 from cutsim.bodies.rigid_motion import Coordinate, RigidMotion
 from cutsim.bodies.schemes import Scheme
@@ -81,7 +82,7 @@ class Attachment:
 
 
 class LinkBorder:
-    """Coordinates of a rigid link as unknowns, `cutsim.base.terms.Border`; the attached nodes are tied to them.
+    """Coordinates of a rigid link as unknowns, `cutsim.base.borders.Border`; the attached nodes are tied to them.
 
     Args:
         state: Displacement and time.

@@ -8,10 +8,11 @@ import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 
+from cutsim.base.borders import Bordered
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.places import Places
-from cutsim.base.terms import Bordered, Columns, Constrained, Diagnosing, Showing, Term, offering
+from cutsim.base.terms import Columns, Constrained, Diagnosing, Showing, Term, offering
 from cutsim.fields.constraints import Constraints, Prescribed
 from cutsim.fields.state import State
 from cutsim.solvers.directions import Directions, Guided

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import Array
-from cutsim.base.terms import Border
+from cutsim.base.borders import Border
 
 
 class Borders:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base import compat
-from cutsim.base.terms import Assembler, Border, Multiplier
+from cutsim.base.borders import Border
+from cutsim.base.terms import Assembler, Multiplier
 from cutsim.solvers.borders import Borders
 from cutsim.solvers.directions import Directions
 from cutsim.solvers.multipliers import Multipliers

@@ -11,10 +11,11 @@ from petsc4py import PETSc
 
 from cutsim.base.arrays import Array
 from cutsim.base.assembly import summed
+from cutsim.base.borders import BorderBlocks
 from cutsim.base.checks import nonnegative, require, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
-from cutsim.base.terms import BorderBlocks, Columns, Term
+from cutsim.base.terms import Columns, Term
 from cutsim.bodies.machine import Machine
 from cutsim.bodies.schemes import Scheme
 from cutsim.fields.state import State
@@ -26,7 +27,7 @@ _NOTHING = 1e-12
 
 
 class CarriageBorder:
-    """Unknowns of a driven rigid motion and their equations, as `cutsim.base.terms.Border`.
+    """Unknowns of a driven rigid motion and their equations, as `cutsim.base.borders.Border`.
 
     Args:
         comm: Communicator of the mesh.
