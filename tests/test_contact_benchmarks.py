@@ -8,15 +8,14 @@ from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
-from cutsim.analysis.stepping import StepControl
-from cutsim.bodies.loads import Support, Traction
+from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.interface.contact import PenaltyContact
-from cutsim.interface.friction import Coulomb
 from cutsim.materials.elastic import LinearElastic
 from cutsim.pairs.surface_pair import SurfacePair
 from helpers.boxes import stack
 from helpers.runs import history
+from validation.contact import SLOPE, WEIGHT, climb
 from validation.dcb import ISOTROPIC, control
 from validation.hertz import CYLINDER, FULL, MINDLIN, QUICK, Indentation, LineContact, indent
 
@@ -121,23 +120,6 @@ def test_cylinder_on_a_block():
 
 
 # -- wedge ------------------------------------------------------------------------------------------------------------
-
-SLOPE, WEIGHT = 0.1, 4.0
-
-
-def climb(mu, *, two_pass):
-    """Push a block of some weight up a slope by three quarters of its length; history."""
-    young = 500.0
-    b = stack(((0.0, -1.0), (12.0, 0.0), (17, 2)), ((1.0, 0.0), (5.0, 2.0), (7, 3)))
-    under, slope, top, side, bottom = (b.face(*w) for w in ((1, 1, 0), (0, 1, 1), (1, 1, 1), (1, 0, 0), (0, 1, 0)))
-    b.state.mesh.geometry.x[:, 1] += SLOPE * b.state.mesh.geometry.x[:, 0]
-    friction = Coulomb(mu) if mu else None
-    pair = SurfacePair(b.state, under, slope, young=young, friction=friction, two_pass=two_pass, search=0.5)
-    weight = Traction(b.state, top, (0.0, -WEIGHT / np.hypot(4.0, 4.0 * SLOPE)), lambda t: 1.0, name="weight")
-    supports = [Support(b.state, bottom, i) for i in range(2)]
-    supports.append(Support(b.state, side, 0, lambda t: 3.0 * t, name="push"))
-    mechanics = Mechanics(b.state, [Solid(b.state, LinearElastic(young, 0.3)), pair, weight], supports)
-    return history(mechanics, 1.0, StepControl.fixed(0.2))
 
 
 @pytest.mark.mpi

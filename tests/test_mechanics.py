@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import ufl
-from dolfinx import fem, mesh
+from dolfinx import mesh
 from mpi4py import MPI
 
 from cutsim.analysis.mechanics import Mechanics
@@ -17,7 +17,6 @@ from cutsim.base.compat import form
 from cutsim.bodies.loads import Support, Traction
 from cutsim.fields.points import Surface
 from cutsim.fields.space import cracked_space
-from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.conduction import HeatBody
 from cutsim.heat.transfer import HeatTransfer
@@ -25,14 +24,15 @@ from cutsim.interface.cohesive import Exponential
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import SmoothCoulomb
-from cutsim.materials.elastic import LinearElastic, NeoHookean
+from cutsim.materials.elastic import NeoHookean
 from cutsim.results.recording import Recording
 from cutsim.solvers.convergence import Tolerances
 from cutsim.tools.shapes import Ball, ToolPath
 from cutsim.tools.tool_contact import ToolContact
-from helpers.blocks import Blocks, make_blocks
+from helpers.blocks import make_blocks
 from helpers.laws import NU, E
 from helpers.runs import history
+from validation.bonds import TABLE, two_boxes
 
 WEAK = Exponential(toughness=0.1, opening=0.1, shear_toughness=0.08, shear_opening=0.15)
 
@@ -84,29 +84,8 @@ def test_newton_converges_quadratically():
 
 # -- the thesis' two boxes --------------------------------------------------------------------------------------------
 
-# residuals and energies of a typical step over the first, as the thesis prints them (Table 4.7)
-TABLE = np.array([1.702439, 1.246976, 7.549132e-5, 6.568224e-9, 6.594945e-16]) / 1.702439
+# energies of a typical step over the first, as the thesis prints them (table 4.7)
 ENERGIES = np.array([1.417000e-7, 4.278462e-9, 3.689671e-13, 4.218806e-17]) / 7.086406e-7
-
-
-def two_boxes():
-    """Two bonded unit cubes of a hexahedron each: the lower one held but for a bonded corner, the upper one lifted."""
-    corners = [[0.0, 0.0, -1.0], [1.0, 1.0, 1.0]]
-    domain = mesh.create_box(MPI.COMM_SELF, corners, (1, 1, 2), mesh.CellType.hexahedron)
-    bonded = mesh.locate_entities(domain, 2, lambda x: np.isclose(x[2], 0.0))
-    lower, upper = (mesh.locate_entities(domain, 3, lambda x, s=s: s * x[2] > -1e-9) for s in (-1, 1))
-    b = Blocks(State(cracked_space(domain, ("Lagrange", 1, (3,)), bonded)), bonded, lower, upper)
-    nodes = np.unique(b.state.V.dofmap.list[lower])
-    held = nodes[np.linalg.norm(b.state.V.tabulate_dof_coordinates()[nodes], axis=1) > 0.1]
-    supports = [Support(b.state, lower, i, dim=3) for i in range(3)]
-    for support in supports:  # a support holds entities; here one node of the lower side of the crack is to be free
-        support.dofs = (3 * held + support.component).astype(np.int32)
-        support.bc = fem.dirichletbc(support.bc.g, support.dofs, b.state.V.sub(support.component))
-    law = Exponential(strength=4.0, opening=1e-4, shear_strength=4.0, shear_opening=1e-4)
-    solid = b.solid(LinearElastic(5e6, 0.48), volumetric="full")
-    crack = b.crack(law, young=5e6, normal="reference")
-    supports += b.drive(upper, [0.0, 0.0, lambda t: 4.8e-4 * t], "top")
-    return Mechanics(b.state, [solid, crack], supports, petsc_options=DIRECT, tolerances=Tolerances(rtol=1e-14))
 
 
 @pytest.mark.parametrize("steps", [10, 100])

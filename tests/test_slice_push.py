@@ -1,47 +1,8 @@
 """A blade that slices along its edge while it is pushed: what friction and energy say of the two forces."""
 
-import numpy as np
 import pytest
-from mpi4py import MPI
 
-from cutsim import (
-    Blade,
-    Drive,
-    Exponential,
-    Fixture,
-    Insertion,
-    NeoHookean,
-    StepControl,
-    cracked_block,
-    geometry,
-    read_geo,
-)
-from cutsim.analysis.stepping import run
-
-TOUGHNESS, WIDTH, HALF_ANGLE, MU = 0.1, 0.2, np.radians(20), 0.2
-
-
-def steady_forces(ratio, friction):
-    """Forces along push and slice, and friction work per push, over the width; walls hold the strip along the edge."""
-    sizes = {"dim": 3, "Lx": 1.0, "H": 4.5, "lc": 0.2, "band": 0.3, "growth": 1.6, "notch": 0.5, "B": WIDTH, "nz": 1}
-    domain = read_geo(geometry("block"), MPI.COMM_WORLD, sizes, gdim=3)
-    body = cracked_block(
-        domain, NeoHookean(0.777, 0.45), Exponential(strength=0.3, toughness=TOUGHNESS), viscosity=2e-4
-    )
-    blade = Blade(HALF_ANGLE, 0.2, 0.5, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
-    drive, held = Drive(1.0, 1.0, slice_push=ratio), Fixture(walls=("front", "back"))
-    cut = Insertion.build(body, blade, drive, notch=0.5, friction=friction, fixture=held)
-    rows = []
-
-    def record(report):
-        force = -sum(contact.force() for contact in cut.contacts)
-        rubbed = report.columns["energy_friction"][0]
-        rows.append((cut.depth, force @ cut.frame.push, force @ cut.frame.edge, rubbed))
-
-    run(cut.mechanics, cut.time_of(2.8), StepControl(first=0.02, largest=0.1), record)
-    depth, push, along, rubbed = np.array([row for row in rows if row[0] >= 1.7]).T
-    way = depth[-1] - depth[0]
-    return np.array([np.trapezoid(push, depth), np.trapezoid(along, depth), rubbed[-1] - rubbed[0]]) / (way * WIDTH)
+from validation.cuts import MU, TOUGHNESS, steady_forces
 
 
 def test_a_smooth_blade_gains_nothing_by_slicing():

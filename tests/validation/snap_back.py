@@ -94,7 +94,7 @@ class Body:
     ends: Callable[[StepReport], bool]
 
 
-CASES = {"composite": (0.25, 0.125, 0.0625, 0.039), "mixed": (92.9, 41.3, 27.3), "fibre": (0.5, 0.25)}
+CASES = {"composite": (0.25, 0.125, 0.0625), "mixed": (92.9, 41.3, 27.3), "fibre": (0.5, 0.25)}
 
 
 class Case(StrEnum):
