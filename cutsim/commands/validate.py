@@ -158,7 +158,8 @@ def _jobs(run: Run, folder: Path, base: Path, *, quick: bool) -> list[_TimedJob]
 def _write(groups: Sequence[Group], found: Sequence[Result], docs: Path) -> None:
     """Keep results, and make the page and the tables of other pages of all that there are."""
     from cutsim.base.files import replace_file
-    from cutsim.validation.page import keyed, page, with_excerpts
+    from cutsim.validation.figure import draw
+    from cutsim.validation.page import FIGURE, keyed, page, with_excerpts
     from cutsim.validation.results import Findings
 
     data = docs / "validation" / "results.json"
@@ -166,6 +167,9 @@ def _write(groups: Sequence[Group], found: Sequence[Result], docs: Path) -> None
     if found:
         known = known.with_results(found, [key for key, _ in keyed(groups)])
         known.write(data)
+    if not (docs / FIGURE).exists() or found:
+        (docs / FIGURE).parent.mkdir(exist_ok=True)
+        draw(docs / FIGURE, groups, known)
     target, readme = docs / "validation.md", docs.parent / "README.md"
     replace_file(target, page(target.read_text(encoding="utf-8"), groups, known).encode())
     replace_file(readme, with_excerpts(readme.read_text(encoding="utf-8"), groups, known).encode())

@@ -10,6 +10,12 @@ from cutsim.validation.rows import Group, Row
 
 #: What stands above this mark in the page is written by hand.
 MARK = "<!-- What follows is written by cutsim validate. -->\n"
+#: Figure of the page, in the folder of the pages.
+FIGURE = "figures/validation.png"
+_CAPTION = (
+    "*Left: error of each row over what it is allowed. Right: errors of rows that were made on finer and finer meshes, "
+    "or with smaller and smaller steps.*"
+)
 _HEAD = (
     "| what | expected | computed, coarse to fine | error | allowed | source | run |\n"
     "|---|---|---|---|---|---|---|\n"
@@ -25,7 +31,7 @@ def page(head: str, groups: Sequence[Group], found: Findings) -> str:
         groups: The rows.
         found: What was found for them.
     """
-    parts = [head.split(MARK)[0] + MARK, _summary(groups, found)]
+    parts = [head.split(MARK)[0] + MARK, _summary(groups, found), f"![Errors of all rows]({FIGURE})", _CAPTION]
     for group in groups:
         parts += [f"## {group.title}", group.text] if group.text else [f"## {group.title}"]
         parts.append(_HEAD + "".join(_line(row, key, found.results.get(key)) for key, row in keyed([group])))
@@ -58,8 +64,8 @@ def _excerpt(match: re.Match[str], rows: dict[str, Row], found: Findings) -> str
     lines = ["| what | computed | expected | source |", "|---|---|---|---|"]
     for key in (key.strip() for key in match[2].split(",")):
         row, result = rows[key], found.results.get(key)
-        cells = ("not run", "") if result is None else (_values(row, result), _number(result.expected, row.unit))
-        lines.append(f"| {row.what} | {cells[0]} | {cells[1]} | {row.source} |")
+        computed = "not run" if result is None else _values(row, result)
+        lines.append(f"| {row.what} | {computed} | {_number(row.expected, row.unit)} | {row.source} |")
     return match[1] + "\n".join(lines) + "\n" + match[3]
 
 

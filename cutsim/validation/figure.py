@@ -1,0 +1,64 @@
+"""The figure of the page on validation: how far rows are inside their tolerances, and how studies converge."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from cutsim.base.arrays import Array
+from cutsim.results.plots import COLOURS
+from cutsim.validation.page import keyed
+from cutsim.validation.results import Findings, Result
+from cutsim.validation.rows import Group
+
+# parts of a tolerance and errors that are drawn as zero
+_LEAST = 1e-6
+
+
+def draw(path: Path, groups: Sequence[Group], found: Findings) -> None:
+    """Draw the error of each row over what is allowed, and the errors of studies on finer and finer meshes.
+
+    Args:
+        path: The picture.
+        groups: The rows.
+        found: What was found for them.
+    """
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for number, group in enumerate(groups):
+        results = [found.results[key] for key, _ in keyed([group]) if key in found.results]
+        colour = COLOURS[number % len(COLOURS)]
+        _shares(left, number, results, colour)
+        for sizes, errors in _studies(results):
+            right.loglog(sizes, errors, "o-", color=colour, markersize=3, linewidth=0.8)
+    left.axvline(1.0, color="#c00")
+    left.set_xscale("log")
+    left.set_yticks(range(len(groups)), [group.title for group in groups])
+    left.invert_yaxis()
+    left.set_xlabel("error over what is allowed")
+    right.set_xlabel("size of elements or steps over that of the coarsest")
+    right.set_ylabel("error")
+    sizes = np.array([0.25, 1.0])
+    for order, style in ((1, ":"), (2, "--")):
+        right.loglog(sizes, 0.3 * sizes**order, style, color="black", label=f"order {order}")
+    right.legend()
+    figure.savefig(path, dpi=120)
+
+
+def _shares(axes: Axes, place: int, results: Sequence[Result], colour: str) -> None:
+    """A mark for each row, at the part of its tolerance that it takes."""
+    shares = [max(abs(r.error) / r.tolerance, _LEAST) for r in results if r.error is not None]
+    aside = place + 0.5 * (np.arange(len(shares)) / max(len(shares), 1) - 0.5)
+    axes.plot(shares, aside, "o", color=colour, markersize=4)
+
+
+def _studies(results: Sequence[Result]) -> Iterator[tuple[Array, Array]]:
+    """Sizes and errors of each study."""
+    for result in results:
+        if len(result.values) > 1 and None not in result.values:
+            values = np.array(result.values, dtype=float)
+            errors: Array = np.abs(values - result.expected) / abs(result.expected or 1.0)
+            if errors.min() > _LEAST:
+                yield np.array([0.5**level for level in range(len(errors))]), errors
