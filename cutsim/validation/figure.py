@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from cutsim.base.arrays import Array
-from cutsim.results.plots import COLOURS
 from cutsim.validation.page import keyed
 from cutsim.validation.results import Findings, Result
 from cutsim.validation.rows import Group
@@ -27,9 +27,10 @@ def draw(path: Path, groups: Sequence[Group], found: Findings) -> None:
     """
     figure = Figure(figsize=(11, 4.5), layout="constrained")
     left, right = figure.subplots(1, 2)
+    colours = colormaps["tab20"].colors  # one for each group
     for number, group in enumerate(groups):
         results = [found.results[key] for key, _ in keyed([group]) if key in found.results]
-        colour = COLOURS[number % len(COLOURS)]
+        colour = colours[number % len(colours)]
         _shares(left, number, results, colour)
         for sizes, errors in _studies(results):
             right.loglog(sizes, errors, "o-", color=colour, markersize=3, linewidth=0.8)
@@ -43,11 +44,13 @@ def draw(path: Path, groups: Sequence[Group], found: Findings) -> None:
     sizes = np.array([0.25, 1.0])
     for order, style in ((1, ":"), (2, "--")):
         right.loglog(sizes, 0.3 * sizes**order, style, color="black", label=f"order {order}")
+    right.set_xticks([1.0, 0.5, 0.25], ["1", "1/2", "1/4"], minor=False)
+    right.set_xticks([], minor=True)
     right.legend()
     figure.savefig(path, dpi=120)
 
 
-def _shares(axes: Axes, place: int, results: Sequence[Result], colour: str) -> None:
+def _shares(axes: Axes, place: int, results: Sequence[Result], colour: tuple[float, ...]) -> None:
     """A mark for each row, at the part of its tolerance that it takes."""
     shares = [max(abs(r.error) / r.tolerance, _LEAST) for r in results if r.error is not None]
     aside = place + 0.5 * (np.arange(len(shares)) / max(len(shares), 1) - 0.5)
