@@ -4,30 +4,12 @@ from math import e, exp, sqrt
 
 import numpy as np
 import pytest
-from mpi4py import MPI
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
-from cutsim.cases import built_in_cases, read_case
-
-COMM = MPI.COMM_WORLD
-CASES = {name: path for name, (_, path) in built_in_cases().items()}
-
-
-def rows(name, **changes):
-    """History of a built-in case in its quick form, with some values changed."""
-    simulation, found = read_case(CASES[name], changes, quick=True).build(COMM), {}
-
-    def record(report):
-        for column, (value, _) in {**report.columns, **simulation.columns(report.columns)}.items():
-            found.setdefault(column, []).append(value)
-
-    simulation.run(record)
-    return {column: np.array(values) for column, values in found.items()}
-
+from validation.thesis import AREA, OPENING, STRENGTH, nominal_stress, printed, rows, torn
 
 # -- two boxes --------------------------------------------------------------------------------------------------------
 
-STRENGTH, OPENING, AREA = 200.0, 0.001, 100.0
 FEW = {"steps.first": "0.1", "steps.largest": "0.1", "mesh.set.n": "2"}
 
 
@@ -56,25 +38,9 @@ def test_boxes_sheared_off_rub_on_each_other(m):
 # -- tear test --------------------------------------------------------------------------------------------------------
 
 
-def drawn(stretch, bulk):
-    """Energy of a bar of the solid of Mooney and Rivlin, C1 = C2 = 1, that is free to contract."""
-
-    def energy(across):
-        volume, squares = stretch * across**2, np.array([stretch, across, across]) ** 2
-        first, second = squares.sum(), volume**2 * (1 / squares).sum()
-        return first * volume ** (-2 / 3) + second * volume ** (-4 / 3) - 6 + bulk / 2 * np.log(volume) ** 2
-
-    return minimize_scalar(energy, (0.1, 2.0), options={"xtol": 1e-10}).fun
-
-
-def nominal_stress(stretch, bulk):
-    return (drawn(stretch + 1e-3, bulk) - drawn(stretch - 1e-3, bulk)) / 2e-3
-
-
 def test_a_bar_tears_at_its_strength():
     """At the stretch at which its nominal stress reaches it; all of the toughness is spent, the halves fly back."""
-    coarse = {"mesh.set.lc": "5", "mesh.set.band": "10", "mesh.set.nz": "1", "mesh.set.growth": "2"}
-    found = rows("tear-bar", **coarse, **{"steps.largest": "1e-3"})
+    found = torn()
     stretch = brentq(lambda x: nominal_stress(x, 48.0) - 5.0, 1.5, 2.5)
     whole = found["crack_broken"] < 0.9 * 25  # before the halves swing
     peak = found["pull_force"][whole].argmax()
@@ -88,9 +54,7 @@ def test_a_bar_tears_at_its_strength():
 
 def test_a_bar_of_the_printed_solid_cannot_tear():
     """Its nominal stress goes through a maximum far below the printed strength of 200 MPa, and of the corrected one."""
-    one = {"mesh.set.lc": "5", "mesh.set.band": "19", "mesh.set.nz": "1", "mesh.set.growth": "100"}
-    changes = {"material.bulk": "0.48", "parameters.stretch": "8", "analysis.type": "quasi-static"}
-    found = rows("tear-bar", **one, **changes, **{"steps.first": "0.01", "steps.largest": "0.01"})
+    found = printed()
     largest = max(nominal_stress(stretch, 0.48) for stretch in np.linspace(1.05, 8.0, 140))
     assert 1.15 < largest < 1.18
     assert found["pull_force"].max() == pytest.approx(25 * largest, rel=0.02)

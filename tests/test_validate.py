@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from cutsim.cases import built_in_cases
 from cutsim.commands.main import app
 from cutsim.results.run_files import Column, RunFiles
 from cutsim.validation.page import MARK, keyed, page, with_excerpts
@@ -184,3 +185,11 @@ def test_the_committed_page_is_made_of_the_committed_results():
     assert text == page(text, groups, found), "run: cutsim validate --page"
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert readme == with_excerpts(readme, groups, found), "run: cutsim validate --page"
+
+
+def test_what_the_rows_run_is_there():
+    runs = [run for group in read_rows(ROOT / "tests" / "validation" / "rows") for run in group.run]
+    programs = {run.program for run in runs if run.program}
+    assert programs <= {path.stem for path in (ROOT / "tests" / "validation").glob("[a-z]*.py")}
+    assert {run.case for run in runs if run.case} <= {*built_in_cases(), *map(str, ROOT.glob("tests/**/*.toml"))}
+    assert sum(len(run.row) for run in runs) >= 80
