@@ -46,8 +46,8 @@ test-mpi: $(STAMP) ## run the tests marked mpi on 2 ranks, and on 3 with two set
 	scripts/run -n 2 -m pytest -x -q -p no:cacheprovider -m mpi tests $(ARGS)
 	scripts/run -n 3 -m pytest -x -q -p no:cacheprovider -m mpi --thin tests $(ARGS)
 
-bench: $(STAMP) ## print wall time, iterations and peak memory of the reference problems
-	for name in cube dcb blade sliding; do echo "== $$name"; \
+bench: $(STAMP) ## print wall and CPU time, iterations, peak memory, and what a solve costs by part, of the reference problems
+	for name in cube dcb blade blade_3d sliding; do echo "== $$name"; \
 	    scripts/run -n $(or $(RANKS),1) tests/benchmarks/bench_$$name.py || exit 1; \
 	done
 

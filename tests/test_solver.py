@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from cutsim.base.jit import jit_cache
 from cutsim.fields.space import cracked_space
-from cutsim.solvers import preconditioners
+from cutsim.solvers import preconditioners, strips
 from cutsim.solvers.convergence import Criteria, Tolerances
 from cutsim.solvers.newton import Kept, NonlinearProblem
 from cutsim.solvers.preconditioners import fallback_for, preset_for, rigid_body_modes
@@ -356,11 +356,12 @@ def test_an_unknown_line_search_is_refused():
     ("n_dofs", "ranks", "has_interface", "gdim", "name", "smoother"),
     [
         (10_000, 1, False, 3, "direct", None),
-        (60_000, 3, True, 3, "direct", None),
+        (19_999, 3, True, 3, "direct", None),
         (60_000, 1, True, 2, "direct", None),
         (10_001, 1, False, 3, "bulk", "richardson"),
         (100_000, 2, False, 3, "bulk", "chebyshev"),
-        (100_000, 1, True, 3, "crack", "richardson"),
+        (20_000, 1, True, 3, "factor", None),
+        (5_000_000, 1, True, 3, "crack", "richardson"),
         (500_000, 2, True, 2, "crack", "chebyshev"),
     ],
 )
@@ -370,15 +371,20 @@ def test_preset_by_size(n_dofs, ranks, has_interface, gdim, name, smoother, symm
     assert preset.name == name
     assert preset.kept.get("mg_levels_ksp_type") == smoother
     factorised = preset.kept if name == "direct" else preset.strip
+    assert preset.kept["pc_type"] == {"direct": factor, "factor": "cholesky"}.get(name, "gamg")
     assert factorised.get("pc_type") == (None if name == "bulk" else factor)
+
+
+def test_the_fallback_of_a_kept_factor_is_multigrid():
+    assert fallback_for(preset_for(100_000, False, 2, True, 3), 100_000, False, 2).name == "crack"
 
 
 def test_the_fallback_is_a_factorisation_while_it_fits():
     bulk = preset_for(100_000, True, 1, False, 3)
-    fallback = fallback_for(bulk, 100_000, True)
+    fallback = fallback_for(bulk, 100_000, True, 1)
     assert fallback is not None and fallback.name == "direct"
-    assert fallback_for(bulk, 5_000_000, True) is None
-    assert fallback_for(fallback, 100_000, True) is None
+    assert fallback_for(bulk, 5_000_000, True, 1) is None
+    assert fallback_for(fallback, 100_000, True, 1) is None
 
 
 @pytest.mark.mpi
@@ -403,7 +409,7 @@ def test_rigid_bodies_need_a_displacement():
 class GluedBlocks(Block):
     """Two halves of a cube held together by springs of `stiffness` per area, solved as if it were large."""
 
-    def __init__(self, monkeypatch, n=6, with_strip=True):
+    def __init__(self, monkeypatch, n=6, with_strip=True, symmetric=True, coupling=((0,) * 3,) * 3, **options):
         for limit in ("DIRECT_LIMIT", "DIRECT_LIMIT_CRACK"):
             monkeypatch.setattr(preconditioners, limit, {3: 0})
         hexahedron, ghosts = mesh.CellType.hexahedron, mesh.GhostMode.shared_facet
@@ -417,11 +423,11 @@ class GluedBlocks(Block):
         crack = crack[crack < V.dofmap.index_map.size_local]
 
         def residual(u, v):
-            return small_strain(u, v) + self.stiffness * ufl.dot(ufl.jump(u), ufl.jump(v)) * dS
+            springs = self.stiffness * (ufl.Identity(3) + ufl.as_matrix(coupling))
+            return small_strain(u, v) + ufl.dot(springs * ufl.jump(u), ufl.jump(v)) * dS
 
-        super().__init__(
-            domain, residual, V, structure=Structure(symmetric=True, interface_dofs=crack if with_strip else None)
-        )
+        structure = Structure(symmetric=symmetric, interface_dofs=crack if with_strip else None)
+        super().__init__(domain, residual, V, structure=structure, **options)
         self.top.value[:] = 0.0, 0.1, 0.2
 
     def iterations(self, stiffness):
@@ -447,6 +453,73 @@ def test_the_strip_matters(monkeypatch):
     with GluedBlocks(monkeypatch, with_strip=False) as blocks:
         blocks.iterations(6.0)
         assert blocks.iterations(6e3) > 20
+
+
+class SkewBlocks(GluedBlocks):
+    """Blocks with springs that answer to sliding with a pressure: the tangent is unsymmetric, as with friction."""
+
+    def __init__(self, monkeypatch, prefix, **options):
+        monkeypatch.setattr(preconditioners, "FACTOR_FROM", 0)
+        skew = ((0, 0, 0), (0, 0, 0), (0.9, 0, 0))
+        options = {"petsc_options_prefix": prefix, "petsc_options": options}
+        super().__init__(monkeypatch, symmetric=False, coupling=skew, **options)
+        self.stiffness.value = 100.0
+
+    def solve(self):
+        """The displacement, from zero, and how many Krylov iterations a Newton iteration took."""
+        self.u.x.array[:] = 0.0
+        outcome = self.problem.solve()
+        assert outcome.converged
+        return self.u.x.array.copy(), outcome.linear_iterations / outcome.iterations
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("stiffness", [1e3, 1.0, -1.0])  # the last one makes the tangent indefinite
+def test_a_kept_factor_finds_the_solution_of_an_exact_one(monkeypatch, stiffness):
+    with SkewBlocks(monkeypatch, "kept_") as kept, SkewBlocks(monkeypatch, "exact_", **EXACT) as direct:
+        assert kept.problem.kept.linear_solver == "factor"
+        kept.solve()
+        kept.stiffness.value = direct.stiffness.value = stiffness
+        reference, _ = direct.solve()
+        of_another_crack, iterations = kept.solve()
+        assert kept.problem.preconditioner.builds == 1 and iterations <= 12
+        np.testing.assert_allclose(of_another_crack, reference, atol=1e-8 * np.abs(reference).max())
+        kept.problem.preconditioner.refresh()
+        of_this_one, iterations = kept.solve()
+        assert kept.problem.preconditioner.builds >= 2 and iterations <= 6
+        np.testing.assert_allclose(of_this_one, reference, atol=1e-8 * np.abs(reference).max())
+
+
+@pytest.mark.mpi
+def test_a_kept_factor_is_made_anew_once_its_excess_has_cost_as_much(monkeypatch):
+    with SkewBlocks(monkeypatch, "excess_") as blocks:
+        blocks.solve()
+        pc = blocks.problem.preconditioner
+        assert 0.0 < pc.price != strips.USUAL_PRICE and pc.memory > 0.0
+        assert WORLD.allgather(pc.price) == [pc.price] * WORLD.size, "so that all ranks decide alike"
+        for later, builds in (((5, 2, 9, 3), 1), ((5, 2, 9, 3, 4), 2)):  # excess over the least: 2, 2, 9, 10, 12
+            pc.price, pc.fresh = 10.0, True
+            pc.observe(3)
+            pc.fresh = False
+            for iterations in later:
+                pc.observe(iterations)
+            blocks.solve()
+            assert pc.builds == builds
+
+
+@pytest.mark.mpi
+def test_multigrid_takes_over_where_memory_is_short(monkeypatch, caplog):
+    with (
+        SkewBlocks(monkeypatch, "short_", factor_mat_mumps_icntl_23=1) as short,
+        SkewBlocks(monkeypatch, "a_") as ample,
+    ):
+        u, _ = short.solve()
+        assert short.problem.kept.linear_solver == "crack" and "multigrid" in short.problem.linear_solver
+        reference, _ = ample.solve()
+        assert ample.problem.kept.linear_solver == "factor" and "MB on a rank" in ample.problem.linear_solver
+        np.testing.assert_allclose(u, reference, atol=1e-8)
+    if WORLD.rank == 0:
+        assert "'factor' failed, its factor would need about" in caplog.text and "'crack' from now on" in caplog.text
 
 
 @pytest.mark.mpi

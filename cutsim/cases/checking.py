@@ -160,7 +160,9 @@ def _cost(simulation: Simulation) -> Iterator[Finding]:
     control = simulation.control
     steps = ceil(simulation.until / getattr(control, "largest", control.first))
     one = seconds / max(outcome.iterations, 1)
+    mechanics = getattr(simulation.problem, "mechanics", simulation.problem)
     yield Finding("cost", "unknowns", str(simulation.problem.state.unknowns))
+    yield Finding("cost", "linear solver", mechanics.problem.linear_solver)
     yield Finding("cost", f"a step to time {end:.3g}", f"{seconds:.2g} s, {outcome.iterations} iterations")
     yield Finding("cost", "memory of all ranks so far", f"{memory:.0f} MB")
     yield Finding("cost", "steps, if none is cut", str(steps))

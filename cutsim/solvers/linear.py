@@ -3,11 +3,26 @@
 from petsc4py import PETSc
 
 from cutsim.base.log import collective_logger
+from cutsim.base.machine import memory_per_rank
 from cutsim.base.options import Options
-from cutsim.solvers.preconditioners import LaggedPC, Preset, create_lagged, fallback_for, preset_for
+from cutsim.solvers.preconditioners import LaggedPC, Preset, fallback_for, preset_for
+from cutsim.solvers.strips import create_lagged
 from cutsim.solvers.system import System
 
 log = collective_logger(__name__)
+
+#: Part of a rank's memory that a kept factor may take; mesh, matrices and vectors need some, too.
+FACTOR_SHARE = 0.6
+
+
+#: The presets in words.
+DESCRIPTIONS = {
+    "direct": "a factorisation, kept while it serves",
+    "bulk": "multigrid",
+    "factor": "a kept factor, and an exact one of the strip along the crack",
+    "crack": "multigrid, and an exact factor of the strip along the crack",
+    "saddle": "multigrid, and elimination of the multipliers",
+}
 
 
 class LinearSolver:
@@ -34,10 +49,21 @@ class LinearSolver:
         """Name of the preset in use, empty if the user's options name a preconditioner."""
         return "" if self._preset is None else self._preset.name
 
+    @property
+    def description(self) -> str:
+        """The preset in use in words, with the memory that a kept factor is expected to need."""
+        if self._preset is None or self.preconditioner is None:
+            return "as the PETSc options say"
+        memory = self.preconditioner.memory
+        return DESCRIPTIONS[self.name] + (f", {memory:.0f} MB on a rank" if memory else "")
+
     def use(self, name: str) -> None:
         """Use the preset of this `name`, which a problem of the same kind has come to."""
-        if name != self.name and (fallback := self._fallback()) is not None and fallback.name == name:
-            self._install(fallback)
+        preset = self._preset
+        while preset is not None and preset.name != name:
+            preset = self._fallback(preset)
+        if preset is not None and preset.name != self.name:
+            self._install(preset)
 
     def observe(self) -> None:
         """Take note of a linear solve that met its tolerance."""
@@ -53,16 +79,17 @@ class LinearSolver:
 
     def improve(self) -> bool:
         """After a failed solve: rebuild the preconditioner, or else factorise; False if neither is left."""
-        if self.preconditioner is None or not self._system.tangent.finite:
+        if self._preset is None or self.preconditioner is None or not self._system.tangent.finite:
             return False
         was_fresh = self.preconditioner.fresh
         self.preconditioner.refresh()
         if not was_fresh:  # it was made for an older tangent; one made for this tangent may do
             return True
-        fallback = self._fallback()
+        fallback = self._fallback(self._preset)
         if fallback is None:
             return False
-        log.warning("Linear solver %r failed: %r from now on", self.name, fallback.name)
+        trouble = self.preconditioner.trouble
+        log.warning("Linear solver %r failed%s: %r from now on", self.name, trouble and f", {trouble}", fallback.name)
         self._install(fallback)
         return True
 
@@ -76,13 +103,13 @@ class LinearSolver:
             structure.interface_dofs is not None,
             system.V.mesh.geometry.dim,
             saddle_point=bool(structure.multipliers or structure.borders),
+            memory=FACTOR_SHARE * memory_per_rank(system.comm),
         )
 
-    def _fallback(self) -> Preset | None:
-        """What to use where the present preset has failed."""
-        if self._preset is None:
-            return None
-        return fallback_for(self._preset, self._system.size, self._system.structure.symmetric)
+    def _fallback(self, failed: Preset) -> Preset | None:
+        """What to use where a preset has failed."""
+        system = self._system
+        return fallback_for(failed, system.size, system.structure.symmetric, system.comm.size)
 
     def _install(self, preset: Preset) -> None:
         self._preset = preset

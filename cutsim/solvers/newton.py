@@ -58,7 +58,7 @@ class NonlinearProblem:
         bcs: Dirichlet conditions. Their values may change between solves, their dofs may not.
         petsc_options: PETSc options without prefix. With `pc_type` or `ksp_type` among them no preset is used and
             PETSc does as told; otherwise they refine the preset of `cutsim.solvers.preconditioners.preset_for`, whose
-            preconditioners have the prefixes `direct_`, `bulk_`, `crack_`, `strip_` and `saddle_`.
+            preconditioners have the prefixes `direct_`, `bulk_`, `factor_`, `crack_`, `strip_` and `saddle_`.
         entity_maps: Entity maps of the forms.
         structure: What is known of the problem beside the form.
         criteria: What convergence is judged by.
@@ -106,6 +106,11 @@ class NonlinearProblem:
     def preconditioner(self) -> LaggedPC | None:
         """The preconditioner of the preset: `refresh` it when the sparsity pattern has changed; None if the user's."""
         return self._iterations.linear.preconditioner
+
+    @property
+    def linear_solver(self) -> str:
+        """What solves the linear equations, in words."""
+        return self._iterations.linear.description
 
     @property
     def kept(self) -> Kept:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from dolfinx import fem, la
+from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -15,6 +15,10 @@ from cutsim.base.assembly import Array, owned_vector
 DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 10_000}
 #: The same with a crack: nearly incompressible, stretched cells under a blade cost multigrid 45 iterations a solve.
 DIRECT_LIMIT_CRACK = {1: 1_000_000, 2: 100_000, 3: 60_000}
+#: Unknowns of a body in space with a crack from which a kept factor of half the size is faster ...
+FACTOR_FROM = 20_000
+#: ... and up to which: operations of a factorisation grow with their square, those of multigrid in proportion.
+FACTOR_LIMIT = 2_000_000
 #: Unknowns up to which a factorisation is worth trying when everything else failed.
 FALLBACK_LIMIT = 200_000
 
@@ -24,22 +28,29 @@ class Preset:
     """Preset of a linear solver: a Krylov method, a preconditioner that is kept, and perhaps a strip along the crack.
 
     Attributes:
-        name: "direct", "bulk", "crack" or "saddle".
+        name: "direct", "bulk", "factor", "crack" or "saddle".
         ksp: PETSc options of the Krylov method, without prefix.
         kept: PETSc options of the preconditioner kept by `LaggedPC`, without prefix.
-        patience: Krylov iterations of one solve beyond which the kept preconditioner counts as stale.
+        patience: Krylov iterations of one solve beyond which the kept preconditioner counts as stale, if that decides.
         strip: PETSc options of the solver on the strip along the crack (`StripCycle`), empty without strip.
     """
 
     name: str
     ksp: Mapping[str, Any]
     kept: Mapping[str, Any]
-    patience: int
+    patience: int = 0
     strip: Mapping[str, Any] = field(default_factory=dict)
 
 
 def preset_for(
-    n_dofs: int, symmetric: bool, ranks: int, has_interface: bool, gdim: int, *, saddle_point: bool = False
+    n_dofs: int,
+    symmetric: bool,
+    ranks: int,
+    has_interface: bool,
+    gdim: int,
+    *,
+    saddle_point: bool = False,
+    memory: float = 0.0,
 ) -> Preset:
     """Choose the linear solver by size, symmetry, ranks and presence of a crack.
 
@@ -54,42 +65,59 @@ def preset_for(
         has_interface: Whether there is a crack, whose stiffness may be very large or negative.
         gdim: Dimension of space; in the plane a factorisation stays cheap much longer.
         saddle_point: Whether there are multipliers.
+        memory: What a kept factor may take of each rank [MB]; 0 for no limit.
 
     Returns:
         The preset.
     """
+    if has_interface and not saddle_point and gdim == 3 and FACTOR_FROM <= n_dofs <= FACTOR_LIMIT:
+        # flexible GMRES keeps the preconditioned vectors, and need not apply the preconditioner once more at the end
+        ksp = _gmres(1e-4, 100) | {"ksp_type": "fgmres"}
+        kept = _factor(symmetric=True) | {"mat_mumps_icntl_23": int(memory)}
+        return Preset("factor", ksp, kept, strip=_factor(symmetric))
     limit = (DIRECT_LIMIT_CRACK if has_interface or saddle_point else DIRECT_LIMIT)[gdim]
     # multipliers beside a stiff crack leave the strip along it no place in the cycle
     if n_dofs <= (FALLBACK_LIMIT if has_interface and saddle_point else limit):
         return _direct(symmetric)
-    # On several ranks SOR is a block method, which needs Chebyshev to bound it.
-    smoother = "richardson" if ranks == 1 else "chebyshev"
-    amg = {
-        "pc_type": "gamg",
-        "mg_levels_ksp_type": smoother,
-        "mg_levels_ksp_max_it": 1,
-        "mg_levels_pc_type": "sor",
-    }
     # a tighter tolerance gains nothing: Newton's own error is larger until the last iteration
     if saddle_point:
-        return Preset("saddle", _gmres(1e-4, 200), _schur(amg), patience=60)
+        return Preset("saddle", _gmres(1e-4, 200), _schur(_multigrid(ranks)), patience=60)
     if has_interface:
-        return Preset("crack", _gmres(1e-4, 200), amg, patience=40, strip=_factor(symmetric))
-    return Preset("bulk", _gmres(1e-4, 200), amg, patience=30)
+        return _crack(symmetric, ranks)
+    return Preset("bulk", _gmres(1e-4, 200), _multigrid(ranks), patience=30)
 
 
-def fallback_for(failed: Preset, n_dofs: int, symmetric: bool) -> Preset | None:
+def fallback_for(failed: Preset, n_dofs: int, symmetric: bool, ranks: int) -> Preset | None:
     """What to try when a freshly built preconditioner has failed.
 
     Args:
         failed: The preset that failed.
         n_dofs: Global number of unknowns.
         symmetric: Whether the tangent is symmetric.
+        ranks: Number of MPI ranks.
 
     Returns:
-        A factorisation, or None where that is what failed or would not fit.
+        Multigrid where memory is short for a kept factor; else a factorisation, or None where that is what failed or
+        would not fit.
     """
+    if failed.name == "factor":
+        return _crack(symmetric, ranks)
     return None if failed.name == "direct" or n_dofs > FALLBACK_LIMIT else _direct(symmetric)
+
+
+def _crack(symmetric: bool, ranks: int) -> Preset:
+    return Preset("crack", _gmres(1e-4, 200), _multigrid(ranks), patience=40, strip=_factor(symmetric))
+
+
+def _multigrid(ranks: int) -> dict[str, Any]:
+    # On several ranks SOR is a block method, which needs Chebyshev to bound it.
+    smoother = "richardson" if ranks == 1 else "chebyshev"
+    return {
+        "pc_type": "gamg",
+        "mg_levels_ksp_type": smoother,
+        "mg_levels_ksp_max_it": 1,
+        "mg_levels_pc_type": "sor",
+    }
 
 
 def _direct(symmetric: bool) -> Preset:
@@ -173,29 +201,6 @@ def _orthonormalise(vectors: list[PETSc.Vec]) -> None:
         v.normalize()
 
 
-def strip_dofs(V: fem.FunctionSpace, interface_dofs: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Unknowns of the crack faces and of one layer of cells beside each. Collective.
-
-    Args:
-        V: The displacement space.
-        interface_dofs: Owned (blocked) dofs on both faces of the cracks.
-
-    Returns:
-        Owned unrolled dofs, ascending.
-    """
-    index_map, bs = V.dofmap.index_map, V.dofmap.index_map_bs
-    mark = la.vector(index_map, 1)
-    mark.array[interface_dofs] = 1.0
-    mark.scatter_forward()
-    cells = V.dofmap.list
-    # a cell may touch the crack with a node that another rank owns, and mark nodes of that rank: forward, then back
-    layer = cells[np.any(mark.array[cells] > 0.0, axis=1)]
-    mark.array[layer.ravel()] = 1.0
-    mark.scatter_reverse(la.InsertMode.add)
-    nodes = np.flatnonzero(mark.array[: index_map.size_local] > 0.0)
-    return (nodes[:, None] * bs + np.arange(bs)).ravel().astype(np.int32)
-
-
 class LaggedPC:
     """PETSc python preconditioner that keeps an inner one until it has gone stale.
 
@@ -210,11 +215,15 @@ class LaggedPC:
     Attributes:
         builds: How often the inner preconditioner was built.
         fresh: Whether it was built for the present tangent.
+        memory: What it is expected to need on a rank [MB], 0 where that is not known.
+        trouble: Why it could not be built, in words, if that is known.
     """
 
     def __init__(self, prefix: str, patience: int) -> None:
         self.builds = 0
         self.fresh = False
+        self.memory = 0.0
+        self.trouble = ""
         self._prefix, self._patience = prefix, patience
         self._limit = float(patience)
         self._stale = True
@@ -245,15 +254,9 @@ class LaggedPC:
         """Called by PETSc when the tangent has changed."""
         if self._inner is not None and self._inner.getFailedReason():
             self._free()  # set up again for an unchanged tangent it would forget that it has no factor
-        if self._inner is None:
-            self._inner = _create_pc(self._prefix, *pc.getOperators())
-            self._stale = True
-        self.fresh = self._stale
-        # PETSc would set the inner one up for every tangent: it is told to keep what it has until it is stale
+        self.fresh = self._stale = self._stale or self._inner is None
         if self._stale:
-            self._inner.setReusePreconditioner(False)
-            self._inner.setUp()
-            self._inner.setReusePreconditioner(True)
+            self._build(*pc.getOperators())
             self.builds += 1
         self._stale = False
         pc.setFailedReason(self._inner.getFailedReason())
@@ -266,101 +269,23 @@ class LaggedPC:
         """Called by PETSc at the end."""
         self._free()
 
+    def _build(self, A: PETSc.Mat, P: PETSc.Mat) -> None:
+        """Build the inner preconditioner for a tangent."""
+        if self._inner is None:
+            self._inner = create_pc(self._prefix, A, P)
+        # PETSc would set the inner one up for every tangent: it is told to keep what it has until it is stale
+        self._inner.setReusePreconditioner(False)
+        self._inner.setUp()
+        self._inner.setReusePreconditioner(True)
+
     def _free(self) -> None:
         if self._inner is not None:
             self._inner.destroy()
             self._inner = None
 
 
-class StripCycle(LaggedPC):
-    """Multiplicative cycle strip, kept preconditioner, strip; for cracks of any stiffness.
-
-    Multigrid built in the elastic state is kept while the crack stiffens, softens and opens: what changes is
-    confined to the strip along the crack, and that is factorised anew for every tangent.
-
-    Args:
-        prefix: Options prefix of the kept preconditioner.
-        patience: As for `LaggedPC`.
-        strip_prefix: Options prefix of the solver on the strip.
-        dofs: Owned unrolled dofs of the strip, see `strip_dofs`.
-        symmetric: Whether the tangent is symmetric.
-    """
-
-    def __init__(self, prefix: str, patience: int, strip_prefix: str, dofs: NDArray[np.int32], symmetric: bool) -> None:
-        super().__init__(prefix, patience)
-        self._strip_prefix, self._dofs, self._symmetric = strip_prefix, dofs, symmetric
-        self._strip: Any = None
-
-    def setUp(self, pc: PETSc.PC) -> None:
-        """Called by PETSc when the tangent has changed."""
-        super().setUp(pc)
-        A = pc.getOperators()[1]
-        if self._strip is None:
-            self._is = PETSc.IS().createGeneral(self._dofs + A.getOwnershipRange()[0], comm=A.comm)
-            self._B = A.createSubMatrix(self._is, self._is)
-            # a sub-matrix does not inherit this from the matrix
-            self._B.setOption(PETSc.Mat.Option.SYMMETRIC, self._symmetric)
-            self._strip = _create_pc(self._strip_prefix, self._B, self._B)
-            self._b, self._c = self._B.createVecs()
-            self._r, self._z = A.createVecs()
-        else:
-            A.createSubMatrix(self._is, self._is, self._B)
-            self._strip.setOperators(self._B, self._B)
-        self._strip.setUp()
-        if self._strip.getFailedReason():
-            pc.setFailedReason(self._strip.getFailedReason())
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Called by PETSc: one cycle from y = 0."""
-        # each part sees the residual that the one before it leaves; added up, they would correct the strip twice
-        A = pc.getOperators()[0]
-        y.set(0.0)
-        self._correct_strip(x, y)
-        A.mult(y, self._r)
-        self._r.aypx(-1.0, x)
-        self._inner.apply(self._r, self._z)
-        y.axpy(1.0, self._z)
-        A.mult(y, self._r)
-        self._r.aypx(-1.0, x)
-        self._correct_strip(self._r, y)
-
-    def _correct_strip(self, r: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add to y the solution on the strip for the residual r."""
-        self._b.array[:] = r.array_r[self._dofs]
-        self._strip.apply(self._b, self._c)
-        y.array[self._dofs] += self._c.array_r
-
-    def _free(self) -> None:
-        super()._free()
-        if self._strip is not None:
-            for thing in (self._strip, self._is, self._B, self._b, self._c, self._r, self._z):
-                thing.destroy()
-            self._strip = None
-
-
-def create_lagged(
-    preset: Preset,
-    prefix: str,
-    V: fem.FunctionSpace,
-    interface_dofs: NDArray[np.int32] | None,
-    symmetric: bool,
-) -> LaggedPC:
-    """The preconditioner of a preset, to be made the context of a PETSc python preconditioner. Collective.
-
-    Args:
-        preset: The preset.
-        prefix: Options prefix of the problem; the kept preconditioner adds the name of the preset.
-        V: The displacement space.
-        interface_dofs: Owned (blocked) dofs on both faces of the cracks, if the preset has a strip.
-        symmetric: Whether the tangent is symmetric.
-    """
-    kept = f"{prefix}{preset.name}_"
-    if not preset.strip or interface_dofs is None:
-        return LaggedPC(kept, preset.patience)
-    return StripCycle(kept, preset.patience, prefix + "strip_", strip_dofs(V, interface_dofs), symmetric)
-
-
-def _create_pc(prefix: str, A: PETSc.Mat, P: PETSc.Mat) -> PETSc.PC:
+def create_pc(prefix: str, A: PETSc.Mat, P: PETSc.Mat) -> PETSc.PC:
+    """A preconditioner for a tangent, as the options with a prefix say; not set up. Collective."""
     pc = PETSc.PC().create(A.comm)
     pc.setOptionsPrefix(prefix)
     pc.setOperators(A, P)
