@@ -54,7 +54,7 @@ def command(
     screen = console()
     found = _results(chosen, folder, jobs, quick=quick, screen=screen)
     if not quick:
-        _write(groups, found, docs)
+        _write(read_rows(folder / "rows"), found, docs)  # anew: a run takes minutes, in which rows may be added
     outside = [result for result in found if not result.inside]
     if found:
         rows = [[r.key, _short(r.values[-1]), _short(r.expected), "" if r.inside else r.reason] for r in found]
