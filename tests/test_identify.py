@@ -33,6 +33,7 @@ from cutsim.materials.library import material
 from helpers.examples import ISOTROPIC
 from helpers.materials import PATHS, energy, incompressible, name, nominal
 from helpers.pages import run_page
+from validation.intervals import RANGES, TRIALS, trials
 
 # -- numbers of a law -------------------------------------------------------------------------------------------------
 
@@ -330,33 +331,11 @@ def test_bad_problems_of_least_squares_are_refused(caplog):
 
 # -- materials --------------------------------------------------------------------------------------------------------
 
-RANGES = {"uniaxial": (0.6, 2.5), "equibiaxial": (1.0, 2.0), "pure shear": (1.0, 2.5)}
-TRIALS = {
-    "neo-Hookean": (NeoHookean(0.7, 0.45), {"young": 0.4}, ["uniaxial"]),
-    "Mooney-Rivlin": (MooneyRivlin(0.3, 0.1, 4.0), {"c1": 0.2, "c2": 0.2}, ["uniaxial"]),
-    "Ogden-2": (
-        Ogden((0.5, 0.3), (1.3, -2.0), 2.0),
-        {"moduli[0]": 0.4, "moduli[1]": 0.4, "exponents[0]": 2.0, "exponents[1]": -3.0},
-        list(RANGES),
-    ),
-}
-
 
 @pytest.mark.parametrize("case", TRIALS)
 def test_intervals_hold_what_they_promise(case):
     """With noise of 2 % of the largest stress each number lies in its 95 % interval in at least 90 of 100 trials."""
-    solid, guess, paths = TRIALS[case]
-    response = HomogeneousResponse(solid, [(path, np.linspace(*RANGES[path], 25)) for path in paths])
-    exact = response.stress({})
-    weights = np.repeat(1 / np.abs(exact.reshape(-1, 25)).max(axis=1), 25)
-    rng, inside, widths, doubts = np.random.default_rng(1), Counter(), Counter(), 0
-    for _ in range(100):
-        data = exact + 0.02 / weights * rng.standard_normal(len(weights))
-        fit = fit_model(response.stress, guess, data, weights=weights)
-        doubts += fit.systematic
-        for parameter, (low, high) in fit.intervals().items():
-            inside[parameter] += low <= numbers(solid)[parameter] <= high
-            widths[parameter] += (high - low) / abs(numbers(solid)[parameter]) / 100
+    inside, widths, doubts = trials(case)
     assert min(inside.values()) >= 90, inside
     assert doubts <= 4, "noise is called systematic once in a hundred fits"
     assert max(widths.values()) < 0.7, "an interval that says nothing is no feat"
