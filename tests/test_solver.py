@@ -8,6 +8,7 @@ from dolfinx.fem import petsc
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from cutsim.base import compat
 from cutsim.base.jit import jit_cache
 from cutsim.fields.space import cracked_space
 from cutsim.solvers import preconditioners, strips
@@ -505,6 +506,21 @@ def test_a_kept_factor_is_made_anew_once_its_excess_has_cost_as_much(monkeypatch
                 pc.observe(iterations)
             blocks.solve()
             assert pc.builds == builds
+
+
+@pytest.mark.mpi
+def test_forms_in_parts_add_up_to_the_whole(monkeypatch):
+    """Cells, outer and inner facets have forms of their own where the mesh is large."""
+    found = []
+    for large in (1_000_000, 0):
+        monkeypatch.setattr(compat, "_IN_PARTS", large)
+        with SkewBlocks(monkeypatch, "parts_") as blocks:
+            u, _ = blocks.solve()
+            problem = blocks.problem
+            matrix = problem.snes.getJacobian()[0]
+            found.append((u, problem.residual().array.copy(), matrix.norm(), matrix.getDiagonal().array.copy()))
+    for whole, parts in zip(*found, strict=True):
+        np.testing.assert_allclose(parts, whole, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.mpi

@@ -66,7 +66,7 @@ class Mass:
         """
         V = self._state.V
         form = compat.form(self.form(ufl.TrialFunction(V), ufl.TestFunction(V)))
-        mass = Tangent(form, V, symmetric=True, directions=directions)
+        mass = Tangent([form], V, symmetric=True, directions=directions)
         mass.assemble(bcs)
         x, b = mass.A.createVecs()
         b.array[:] = forces

@@ -9,6 +9,7 @@ from time import perf_counter
 import numpy as np
 from mpi4py import MPI
 
+from cutsim.analysis.staggered import ThermoMechanics
 from cutsim.analysis.steps import begin
 from cutsim.cases.building import Simulation
 from cutsim.cases.sizes import element_sizes, group_area, kind_of_cells
@@ -160,7 +161,8 @@ def _cost(simulation: Simulation) -> Iterator[Finding]:
     control = simulation.control
     steps = ceil(simulation.until / getattr(control, "largest", control.first))
     one = seconds / max(outcome.iterations, 1)
-    mechanics = getattr(simulation.problem, "mechanics", simulation.problem)
+    problem = simulation.problem
+    mechanics = problem.mechanics if isinstance(problem, ThermoMechanics) else problem
     yield Finding("cost", "unknowns", str(simulation.problem.state.unknowns))
     yield Finding("cost", "linear solver", mechanics.problem.linear_solver)
     yield Finding("cost", f"a step to time {end:.3g}", f"{seconds:.2g} s, {outcome.iterations} iterations")

@@ -17,8 +17,8 @@ class Residual:
     """Internal minus external forces on the displacement, and its prescribed values. Every method is collective.
 
     Args:
-        L: Compiled forces.
-        a: Their compiled tangent, through which prescribed increments are lifted.
+        L: Compiled forces, whose sum counts.
+        a: Their compiled tangents, through which prescribed increments are lifted.
         u: The displacement.
         bcs: Dirichlet conditions on components.
         assemblers: Forces that are no form.
@@ -33,14 +33,15 @@ class Residual:
 
     def __init__(
         self,
-        L: fem.Form,
-        a: fem.Form,
+        L: Sequence[fem.Form],
+        a: Sequence[fem.Form],
         u: fem.Function,
         bcs: Sequence[fem.DirichletBC],
         assemblers: Sequence[Assembler],
         directions: Directions,
     ) -> None:
-        self._L, self._a, self._u, self._bcs, self._assemblers = L, a, u, list(bcs), tuple(assemblers)
+        self._L, self._a, self._u = tuple(L), tuple(a), u
+        self._bcs, self._assemblers = list(bcs), tuple(assemblers)
         self._directions = directions
         V = u.function_space
         layout = V.dofmap.index_map, V.dofmap.index_map_bs
@@ -92,10 +93,12 @@ class Residual:
             assembler.prepare()
         r = self._r.array
         r[:] = 0.0
-        fem.assemble_vector(r, self._L)
+        for L in self._L:
+            fem.assemble_vector(r, L)
         if lift:
             bcs = [*self._directions.lifting(self._u.x.array), *self._bcs]
-            fem.apply_lifting(r, [self._a], [bcs], [self._u.x.array], -1.0)
+            for a in self._a:
+                fem.apply_lifting(r, [a], [bcs], [self._u.x.array], -1.0)
         self._r.scatter_reverse(la.InsertMode.add)
         r[: self.n] += self.known
         if self._assemblers:

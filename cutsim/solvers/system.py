@@ -78,7 +78,7 @@ class System:
     ) -> None:
         self._u, self._bcs, self.structure = u, list(bcs), structure
         J = ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
-        L, a = (compat.form(form, entity_maps=entity_maps) for form in (F, J))
+        L, a = (compat.forms(form, entity_maps=entity_maps) for form in (F, J))
         self.directions = structure.directions or Directions(u.function_space)
         self.forces = Residual(L, a, u, bcs, structure.assemblers, self.directions)
         self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers, self.directions)

@@ -4,25 +4,27 @@ from collections.abc import Sequence
 
 import numpy as np
 from dolfinx import fem, la
+from dolfinx.cpp.la.petsc import create_matrix
 from dolfinx.fem import petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from cutsim.base import compat
 from cutsim.base.terms import Assembler
 from cutsim.solvers.directions import Directions
 from cutsim.solvers.preconditioners import rigid_body_modes
 
 
 class Tangent:
-    """PETSc matrix of a bilinear form on one space with itself. Every method is collective.
+    """PETSc matrix of bilinear forms on one space with itself. Every method is collective.
 
     On one rank PETSc works on the arrays of a dolfinx matrix, into which the cells are inserted in half the time; on
     several ranks dolfinx inserts into PETSc's own matrix.  Terms that assemble themselves have a matrix of their own,
     with a pattern of its own; the sum of both is a third one.
 
     Args:
-        a: The compiled form.
-        V: Its space; displacements give the matrix their rigid-body modes as near-nullspace.
+        a: The compiled forms, whose sum counts.
+        V: Their space; displacements give the matrix their rigid-body modes as near-nullspace.
         symmetric: Whether it is symmetric.
         assemblers: Forces that are no form.
         directions: Axes of the nodes, along which the matrix has its rows and columns.
@@ -33,23 +35,25 @@ class Tangent:
 
     def __init__(
         self,
-        a: fem.Form,
+        a: Sequence[fem.Form],
         V: fem.FunctionSpace,
         symmetric: bool,
         assemblers: Sequence[Assembler] = (),
         directions: Directions | None = None,
     ) -> None:
-        self._a, self._V, self._symmetric, self._assemblers = a, V, symmetric, tuple(assemblers)
+        self._a, self._V, self._symmetric, self._assemblers = tuple(a), V, symmetric, tuple(assemblers)
         self._directions = directions or Directions(V)
+        pattern = compat.sparsity_pattern(self._a)
+        pattern.finalize()
         if V.mesh.comm.size == 1:
-            self._csr = fem.create_matrix(a, block_mode=la.BlockMode.expanded)
+            self._csr = la.matrix_csr(pattern, block_mode=la.BlockMode.expanded)
             n = len(self._csr.indptr) - 1
             arrays = self._csr.indptr.astype(PETSc.IntType), self._csr.indices, self._csr.data
             self._forms = PETSc.Mat().createAIJWithArrays((n, n), arrays, comm=V.mesh.comm)
             self._forms.setBlockSize(V.dofmap.index_map_bs)
         else:
             self._csr = None
-            self._forms = petsc.create_matrix(a)
+            self._forms = create_matrix(V.mesh.comm, pattern)
         self._added: PETSc.Mat | None = None
         self.A = self._sum = self._forms
         self._axes = self._directions.matrix() if self._directions else None
@@ -108,10 +112,13 @@ class Tangent:
     def _assemble_forms(self, bcs: Sequence[fem.DirichletBC]) -> None:
         if self._csr is None:
             self._forms.zeroEntries()
-            petsc.assemble_matrix(self._forms, self._a, bcs)
+            for a in self._a:
+                petsc.assemble_matrix(self._forms, a, bcs)
+                self._forms.assemble(PETSc.Mat.AssemblyType.FLUSH)
         else:
             self._csr.set_value(0.0)
-            fem.assemble_matrix(self._csr, self._a, bcs)
+            for a in self._a:
+                fem.assemble_matrix(self._csr, a, bcs)
         self._forms.assemble()
 
     def _add(self, added: PETSc.Mat, bcs: Sequence[fem.DirichletBC]) -> None:
