@@ -9,6 +9,7 @@ import pytest
 from scipy import optimize, stats
 
 from cutsim import IsochoricNeoHookean, LinearElastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from cutsim.base.jit import JIT_OPTIONS
 from cutsim.base.parameters import numbers, substituted, with_numbers
 from cutsim.base.units import Units
 from cutsim.identify import (
@@ -286,6 +287,14 @@ def test_drucker_stability():
     assert unstable_stretches(solid, 0.2, 5.0) == {}
     # ∂²W/∂e² at rest: G [[4, 2], [2, 4]]
     assert HomogeneousResponse(solid, [("uniaxial", [1.0])]).modulus({})[0] == pytest.approx(2 * 0.7, rel=1e-12)
+
+
+def test_equal_materials_are_compiled_once(monkeypatch, tmp_path):
+    """However many variables the process has had, by which the energy is differentiated."""
+    monkeypatch.setitem(JIT_OPTIONS, "cache_dir", str(tmp_path))
+    first, second = (HomogeneousResponse(NeoHookean(E, 0.3), [("uniaxial", [1.2])]) for E in (1.0, 2.0))
+    assert len(list(tmp_path.glob("*.c"))) == 1
+    assert second.stress({})[0] == pytest.approx(2 * first.stress({})[0], rel=1e-12)
     softening = substituted(Yeoh(0.3, 0.01, 0.0, 4.0), {"c2": -0.05})
     span = unstable_stretches(softening, 1.0, 3.0)["uniaxial"]
     stretch = np.linspace(1.0, span[0] * 0.98, 200)

@@ -20,6 +20,8 @@ from dolfinx.mesh import GhostMode, Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from ufl.algorithms import expand_derivatives
+from ufl.algorithms.transformer import strip_variables
 
 from cutsim.base.jit import JIT_OPTIONS, jit_cache
 
@@ -144,8 +146,10 @@ def expression(expression: Any, points: NDArray[np.float64], mesh: Mesh) -> fem.
     Returns:
         The compiled expression.
     """
+    # its signature counts the variables of the whole process: without them equal expressions are compiled once
+    plain = strip_variables(expand_derivatives(expression))
     with jit_cache(mesh.comm):
-        return fem.Expression(expression, points, jit_options=JIT_OPTIONS)
+        return fem.Expression(plain, points, jit_options=JIT_OPTIONS)
 
 
 def nodal_expression(expression_: Any, V: fem.FunctionSpace) -> fem.Expression:
