@@ -325,7 +325,7 @@ def test_options_stay_with_their_problem():
     before = dict(everywhere.getAll())
     try:
         with Block(square(), petsc_options={"snes_max_it": 7}) as block:
-            assert block.problem.snes.getKSP().getType() == "gmres"
+            assert block.problem.snes.getKSP().getType() == "fgmres"
             assert block.problem.snes.getTolerances()[3] == 7
             assert everywhere["block_snes_max_it"] == "7"
             block.problem.solve()

@@ -71,10 +71,8 @@ def preset_for(
         The preset.
     """
     if has_interface and not saddle_point and gdim == 3 and FACTOR_FROM <= n_dofs <= FACTOR_LIMIT:
-        # flexible GMRES keeps the preconditioned vectors, and need not apply the preconditioner once more at the end
-        ksp = _gmres(1e-4, 100) | {"ksp_type": "fgmres"}
         kept = _factor(symmetric=True) | {"mat_mumps_icntl_23": int(memory)}
-        return Preset("factor", ksp, kept, strip=_factor(symmetric))
+        return Preset("factor", _flexible(1e-4, 100), kept, strip=_factor(symmetric))
     limit = (DIRECT_LIMIT_CRACK if has_interface or saddle_point else DIRECT_LIMIT)[gdim]
     # multipliers beside a stiff crack leave the strip along it no place in the cycle
     if n_dofs <= (FALLBACK_LIMIT if has_interface and saddle_point else limit):
@@ -122,7 +120,7 @@ def _multigrid(ranks: int) -> dict[str, Any]:
 
 def _direct(symmetric: bool) -> Preset:
     # a factorisation of an older tangent is a preconditioner, too: a few iterations are cheaper than a new one
-    return Preset("direct", _gmres(1e-6, 20), _factor(symmetric), patience=8)
+    return Preset("direct", _flexible(1e-6, 20), _factor(symmetric), patience=8)
 
 
 def _factor(symmetric: bool) -> dict[str, Any]:
@@ -147,6 +145,11 @@ def _schur(amg: Mapping[str, Any]) -> dict[str, Any]:
 
 def _gmres(rtol: float, max_it: int) -> dict[str, Any]:
     return {"ksp_type": "gmres", "ksp_pc_side": "right", "ksp_rtol": rtol, "ksp_max_it": max_it}
+
+
+def _flexible(rtol: float, max_it: int) -> dict[str, Any]:
+    # it keeps the preconditioned vectors, and need not apply the preconditioner once more at the end
+    return _gmres(rtol, max_it) | {"ksp_type": "fgmres"}
 
 
 def rigid_body_modes(V: fem.FunctionSpace, turn: Callable[[Array], Array] = np.asarray) -> PETSc.NullSpace:
