@@ -13,6 +13,9 @@ from cutsim.results.run_files import RunFiles
 from cutsim.validation.readings import ReadingError, read_value
 from cutsim.validation.rows import Row, Run
 
+# part of a reference that is no error
+_ROUNDING = 1e-8
+
 
 @dataclass(frozen=True)
 class Level:
@@ -32,7 +35,7 @@ class Level:
     def unknowns(self) -> int | None:
         """Unknowns of the largest problem that it has solved; None if it does not say."""
         found = (RunFiles.read(path.parent).summary.get("unknowns") for path in self.files.folder.rglob(SUMMARY))
-        return max((number for number in found if isinstance(number, int)), default=None)
+        return max((number for number in found if isinstance(number, int) and number), default=None)
 
 
 @dataclass(frozen=True)
@@ -114,13 +117,11 @@ def _values(value: str | list[str], levels: Sequence[Level]) -> tuple[list[float
 
 
 def _order(values: Sequence[float | None], expected: float, ratio: float) -> float | None:
-    """Observed order of the last two levels against the reference; None where either meets it or is missing."""
-    if len(values) < 2:
+    """Observed order of the last two levels; None where one is missing or meets the reference but for rounding."""
+    if len(values) < 2 or None in values[-2:]:
         return None
-    before, last = values[-2:]
-    if before is None or last is None or before == expected or last == expected:
-        return None
-    return log(abs(before - expected) / abs(last - expected)) / log(ratio)
+    before, last = (abs(value - expected) / abs(expected or 1.0) for value in values[-2:] if value is not None)
+    return log(before / last) / log(ratio) if min(before, last) > _ROUNDING else None
 
 
 @dataclass(frozen=True)

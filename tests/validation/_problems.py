@@ -40,7 +40,7 @@ def solve(name: str, problems: Mapping[str, Problem]) -> None:
             summary[problem] = dict(problems[problem](quick))
             if comm.rank == 0:
                 typer.echo(f"{problem}: " + ", ".join(f"{key} {value:.6g}" for key, value in summary[problem].items()))
-        unknowns = max(int(found.get("unknowns", 0)) for found in summary.values())
-        write_summary(out / "summary.json", {**summary, "unknowns": unknowns}, comm)
+        unknowns = [int(found["unknowns"]) for found in summary.values() if "unknowns" in found]
+        write_summary(out / "summary.json", summary | ({"unknowns": max(unknowns)} if unknowns else {}), comm)
 
     typer.run(main)
