@@ -2,7 +2,7 @@
 # DOLFINX=wheel|system and PYTHON=/path/to/python3 choose what it takes; docs/install.md says how.
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
-.PHONY: help setup demo validation validate test test-mpi bench lint api docs dist clean always
+.PHONY: help setup demo campaign validation validate test test-mpi bench lint api docs dist clean always
 
 NAME ?= blade
 JOBS ?= $(shell nproc)
@@ -45,6 +45,9 @@ test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those 
 test-mpi: $(STAMP) ## run the tests marked mpi on 2 ranks, and on 3 with two sets of parameters each
 	scripts/run -n 2 -m pytest -x -q -p no:cacheprovider -m mpi tests $(ARGS)
 	scripts/run -n 3 -m pytest -x -q -p no:cacheprovider -m mpi --thin tests $(ARGS)
+
+campaign: $(STAMP) ## run random cuts, or go on with them: SEED=2 ARGS="--plane 50 --space 0"; writes results/campaign
+	$(PYTHON_IN_VENV) tests/campaign/campaign.py --seed $(or $(SEED),1) $(ARGS)
 
 bench: $(STAMP) ## print wall and CPU time, iterations, peak memory, and what a solve costs by part, of the reference problems
 	for name in cube dcb blade blade_3d sliding; do echo "== $$name"; \

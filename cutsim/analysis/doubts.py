@@ -1,36 +1,56 @@
 """What makes a step questionable whatever the terms are: the energy audit, and friction on a path back in time."""
 
 from cutsim.analysis.energy import EnergyAudit
+from cutsim.base.log import collective_logger
 from cutsim.base.verdict import CLOSURE, Verdict
 from cutsim.fields.state import State
+
+logger = collective_logger(__name__)
 
 # growth of the turnover in a step from which on nothing is said aloud: the audit has just begun
 _BEGUN = 2.0
 # friction on the way back in time, over the turnover, that counts as none
 _RUBBED = 1e-6
-#: What a viscosity may take of the energy that is lost.
+#: What a viscosity may take of the work that is done, and a brake of what is lost, without a word.
 VISCOUS = 0.01
 
 
 def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, viscous: float) -> None:
-    """Doubt an audit that does not close, and a viscosity that takes part in what is lost.
+    """Doubt an audit that does not close, and a viscosity that a load has to overcome.
 
     Args:
         verdict: The verdict.
         before: Audit at the start of a step ...
         after: ... and at its end.
-        viscous: Work so far of what may only help the solver [energy].
+        viscous: Work so far against what may only help the solver. What a body sets free when a crack runs by itself
+            is not counted: some viscosity has to take it, and however small it is it takes as much [energy].
     """
     verdict.withdraw("closure")
     if after.worst_closure > CLOSURE:
         words = f"{after.worst_closure:.1%} of the energy is missing in the audit: smaller steps are needed"
         verdict.suppose("closure", words, aloud=after.scale < _BEGUN * before.scale)
-    lost = after.entries["fracture"] + after.entries["friction"]
     verdict.withdraw("viscosity")
-    if lost > 0 and viscous > VISCOUS * (lost + viscous):
-        # before anything breaks it is all of it: what counts is how much it is in the end
-        share = viscous / (lost + viscous)
-        verdict.suppose("viscosity", f"the viscosity takes {share:.1%} of the energy that is lost")
+    if viscous > VISCOUS * after.scale:
+        # in the first steps it may be much of it: what counts is how much it is in the end
+        verdict.suppose("viscosity", f"the viscosity takes {viscous / after.scale:.1%} of the work that is done")
+
+
+def warn_of_brake(before: EnergyAudit, after: EnergyAudit, time: float) -> None:
+    """Warn once of a brake that takes part in what is lost: where a run jumps this is what the body sets free."""
+    shares = [_braked_share(audit) for audit in (before, after)]
+    if shares[0] <= VISCOUS < shares[1]:
+        logger.warning(
+            "the run jumps about time %.6g, where a brake takes more than %.0f %% of the energy that is lost so far; "
+            "see energy_braked",
+            time,
+            100 * VISCOUS,
+        )
+
+
+def _braked_share(audit: EnergyAudit) -> float:
+    braked = audit.entries["braked"]
+    lost = braked + audit.entries["fracture"] + audit.entries["friction"]
+    return braked / lost if lost > 0 else 0.0
 
 
 def doubt_way_back(state: State, before: EnergyAudit, after: EnergyAudit) -> None:

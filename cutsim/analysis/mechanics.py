@@ -10,7 +10,8 @@ import numpy as np
 from dolfinx import cpp, la
 from numpy.typing import NDArray
 
-from cutsim.analysis.doubts import doubt_audit, doubt_way_back
+from cutsim.analysis.brake import Brake
+from cutsim.analysis.doubts import doubt_audit, doubt_way_back, warn_of_brake
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.equilibrium_path import EquilibriumPath
 from cutsim.analysis.mobility import extent
@@ -19,6 +20,7 @@ from cutsim.base.assembly import global_dot
 from cutsim.base.checks import require
 from cutsim.base.signatures import checked
 from cutsim.base.terms import (
+    Advising,
     Augmenting,
     Body,
     Bonded,
@@ -77,6 +79,7 @@ class Mechanics(Balance[Term, Support]):
     Attributes:
         supports: Prescribed displacements.
         motion: What a dynamic analysis adds.
+        brake: What carries a run across a jump; None with inertia, or with loads under which a body may run away.
 
     Raises:
         ValueError: There is no term, two terms or supports share a name, two solids share a cell, two supports
@@ -125,6 +128,10 @@ class Mechanics(Balance[Term, Support]):
         audit, rest = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0)), 0 * state.increment
         self._audit = state.memory.value("mechanics: audit", audit)
         self._rate_forces = state.memory.value("mechanics: rate forces", rest, places=self._residual.places)
+        # beyond the largest load there may be no other equilibrium in which a body comes to rest
+        rests = self.inertia is None and not offering(terms, Advising)
+        self.brake = Brake(self.problem, state) if rests else None
+        self._resisted = state.memory.value("mechanics: viscous work, and the part against the load", (0.0, 0.0))
         self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
     @property
@@ -164,6 +171,7 @@ class Mechanics(Balance[Term, Support]):
         super().begin()
         self.motion.begin()
         self.problem.known[:] = self.motion.known(self._residual.committed)
+        self.problem.drag = 0.0
 
     def predict(self) -> None:
         """Start the search for equilibrium where the last step leads; with inertia the velocity does so already."""
@@ -198,6 +206,8 @@ class Mechanics(Balance[Term, Support]):
         """Trial history, energies and reactions of the converged trial state. Collective."""
         for part in (*self.terms, *self._observers):
             part.evaluate()
+        if self.brake is not None:
+            self.brake.evaluate()
         old = self._residual.committed
         residual = self.motion.forces(self._out_of_balance(), old, self.problem.carried)
         rates = [forces for t in offering(self.terms, RateDependent) if (forces := t.rate_forces()) is not None]
@@ -219,7 +229,8 @@ class Mechanics(Balance[Term, Support]):
         return self.trial_audit.entries["fracture"] - self.audit.entries["fracture"]
 
     def _energies(self) -> list[dict[str, float]]:
-        return [t.energies() for t in offering(self.terms, Energetic)]
+        braked = {} if self.brake is None else {"braked": self.brake.lost}
+        return [*(t.energies() for t in offering(self.terms, Energetic)), braked]
 
     @property
     def audit(self) -> EnergyAudit:
@@ -239,7 +250,12 @@ class Mechanics(Balance[Term, Support]):
         """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
         super().watch()
         viscous = sum((t.viscous_work for t in offering(self.terms, Regularised)), start=0.0)
-        doubt_audit(self.state.verdict, self.audit, self.trial_audit, viscous)
+        work = self.trial_audit.external - self.audit.external
+        # what the body sets free by itself some viscosity has to take, however small it is
+        before, resisted = self._resisted.committed
+        self._resisted.trial = (viscous, resisted + min(viscous - before, max(work, 0.0)))
+        doubt_audit(self.state.verdict, self.audit, self.trial_audit, self._resisted.trial[1])
+        warn_of_brake(self.audit, self.trial_audit, self.state.time)
         doubt_way_back(self.state, self.audit, self.trial_audit)
 
     def reaction(self, held: Support) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cutsim.analysis.availability import Availability
+from cutsim.analysis.brake import Brake
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.base.checks import positive, require, require_number
@@ -47,6 +48,11 @@ class ThermoMechanics:
     @property
     def path(self) -> None:
         """None: heat needs time to go on."""
+
+    @property
+    def brake(self) -> Brake | None:
+        """Brake of the mechanics."""
+        return self.mechanics.brake
 
     @property
     def terms(self) -> tuple[Term, ...]:

@@ -1,7 +1,7 @@
 """Loop over steps: each step is tried, accepted or rejected, and committed here and nowhere else.
 
-One step: begin → move tools and loads → solve → (failure: roll back, another line search, then a smaller step) → trial
-history → accept or reject → commit, record.
+One step: begin → move tools and loads → solve → (failure: roll back, another line search, a smaller step, a step along
+the equilibrium path, a step with a brake) → trial history → accept or reject → commit, record.
 """
 
 import signal
@@ -44,6 +44,8 @@ _STRAYED = 1e-3
 _JUMPED = 0.02
 # corners that differ by less than this fraction of the smallest step are one
 _ROUNDING = 1e-6
+# first and smallest step with a brake over the smallest one without; iterations of an easy one, and the growth after it
+_FIRST, _BRAKED, _EASY, _RELEASE = 2.0**-6, 2.0**-12, 10, 2.0
 # what the verdict says of a run that has not come to its end, until it goes on
 _ENDS = (INTERRUPTED, "ended")
 
@@ -201,13 +203,13 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
     followed = bool(pace.path)
     if followed and (along := follow(problem, control, corner)) is not None:
         return _accept(problem, along, pace_after(problem, control, along))
-    size, cuts = pace.size, 0
+    size, cuts, drag = pace.size, 0, pace.drag
     while True:
         start = state.time_old
         end = corner if start + (1 + _SLIVER) * size >= corner else start + size
-        tried = replace(_attempt(problem, control, end, predict=pace.smooth and not cuts), cuts=cuts)
+        tried = replace(_attempt(problem, control, end, predict=pace.smooth and not cuts, drag=drag), cuts=cuts)
         if tried.refusal is None:
-            return _accept_in_time(problem, control, replace(tried, corner=end == corner), size)
+            return _accept_in_time(problem, control, replace(tried, corner=end == corner), size, drag)
         state.rollback()
         size, cuts = control.next(tried), cuts + 1
         require("control.next(report)", size, size < tried.dt, f"less than {tried.dt:.6g} after a rejected step")
@@ -217,18 +219,34 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
             if (along := follow(problem, control, corner)) is not None:
                 logger.info("from time %.6g the equilibrium path is followed", start)
                 return _accept(problem, replace(along, cuts=cuts + along.cuts), pace_after(problem, control, along))
-        if size < control.smallest:
+        if size < control.smallest and not drag and problem.brake is not None:
+            size = _FIRST * control.smallest
+            drag = size * problem.brake.stiffness
+            logger.info("from time %.6g a brake acts", start)
+        if size < control.smallest * (_BRAKED if drag else 1.0):
             raise _no_step(problem, control, tried)
 
 
-def _accept_in_time(problem: Problem, control: Control, report: StepReport, size: float) -> StepReport:
+def _accept_in_time(problem: Problem, control: Control, report: StepReport, size: float, drag: float) -> StepReport:
     """Commit a step in time; the next one follows the size that was asked for, not what was left before a corner."""
     state, start = problem.state, report.time - report.dt
+    if drag:
+        return _accept(problem, report, _pace_braked(problem, control, report, size, drag))
     if report.cuts and control.next(replace(report, refusal="")) < control.smallest:
         state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
     following = control.next(replace(report, dt=size))
     smooth, turned = not report.corner and not report.cuts, state.pace.committed.turned
     return _accept(problem, report, Pace(repr(control), following, smooth=smooth, turned=turned))
+
+
+def _pace_braked(problem: Problem, control: Control, report: StepReport, size: float, drag: float) -> Pace:
+    """How a run goes on after a step with a brake: by longer ones, and without it when they are long again."""
+    turned = problem.state.pace.committed.turned
+    size = (_RELEASE if report.outcome.iterations <= _EASY else 1.0) * size
+    if size >= control.first:
+        logger.info("at time %.6g the brake is released", report.time)
+        return Pace(repr(control), control.first, turned=turned)
+    return Pace(repr(control), size, turned=turned, drag=drag)
 
 
 def _accept(problem: Problem, report: StepReport, pace: Pace) -> StepReport:
@@ -250,12 +268,14 @@ def _no_step(problem: Problem, control: Control, report: StepReport) -> StepErro
     )
 
 
-def _attempt(problem: Problem, control: Control, end: float, *, predict: bool) -> StepReport:
+def _attempt(problem: Problem, control: Control, end: float, *, predict: bool, drag: float) -> StepReport:
     """Solve the step to `end`."""
     state = problem.state
     for retry, line_search in enumerate(control.line_searches):
         state.rollback()
         begin(problem, end)
+        if drag and problem.brake is not None:
+            problem.brake.hold(drag)
         predicted = predict and not retry
         if predicted:
             problem.predict()

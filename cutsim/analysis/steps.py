@@ -54,6 +54,21 @@ class Path(Protocol):
         """
 
 
+class Brake(Protocol):
+    """Protocol of a drag on a body, which carries a run across a jump."""
+
+    @property
+    def stiffness(self) -> float:
+        """Mean stiffness of a node, beside which a drag is weak or strong [force/length]. Collective."""
+
+    def hold(self, drag: float) -> None:
+        """Let the drag act in the trial step, which has begun.
+
+        Args:
+            drag: Force on a node over its velocity [force·time/length].
+        """
+
+
 class Problem(Protocol):
     """Protocol of what `run` can step: `Mechanics`, `HeatTransfer`, or both as `ThermoMechanics`.
 
@@ -78,6 +93,10 @@ class Problem(Protocol):
     @property
     def path(self) -> Path | None:
         """Its equilibrium path; None if there is none without time. Collective."""
+
+    @property
+    def brake(self) -> Brake | None:
+        """Its brake; None if it does not jump."""
 
     @property
     def audit(self) -> Audit:
@@ -134,7 +153,7 @@ class PathFollowing:
 
     Args:
         facets: Largest loss of a step along the path, in units of the energy that breaks a facet of mean size; 0 for
-            never: then a run ends where no step in time succeeds.
+            never.
         onset: Largest loss of a step in time, in the same units; one that loses more is done anew along the path.
             None: there is no limit; but once the path had to be followed, as no step in time succeeded, a step in time
             that has jumped, by its energy audit, is done anew as well.

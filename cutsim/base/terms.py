@@ -22,7 +22,7 @@ from cutsim.base.kinematics import Expr
 #: Entries of the energy audit; the external work equals their sum (docs/theory.md §6).
 ENTRIES = (
     "strain", "kinetic", "thermoelastic", "cohesive_stored", "contact",  # stored
-    "fracture", "friction", "viscous", "cohesive_viscous", "numerical",  # lost
+    "fracture", "friction", "viscous", "cohesive_viscous", "braked", "numerical",  # lost
 )  # fmt: skip
 
 #: Columns of a history row: name → (value, kind of quantity).
@@ -260,6 +260,14 @@ class Body(Protocol):
     name: str
     cells: NDArray[np.int32] | None
     density: float | None
+
+
+@runtime_checkable
+class Bounded(Protocol):
+    """A term that not every displacement is possible for."""
+
+    def possible(self) -> bool:
+        """Whether the present one is: no element is turned inside out. Collective."""
 
 
 @runtime_checkable

@@ -21,7 +21,7 @@ from cutsim.bodies.quadrature import strain_energy_measures
 from cutsim.bodies.volume_ratio import VolumeRatio
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
-from cutsim.materials.elastic import Material
+from cutsim.materials.elastic import Material, inside_out
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
 
@@ -85,7 +85,7 @@ class Solid(Term):
         measures = strain_energy_measures(state, material, volumetric, cells, name)
         self.formulation = FORMULATIONS[volumetric](elasticity, measures, cells)
         self._energy_form = form(self.formulation.stored(state.u))
-        self._volume = VolumeRatio(self.formulation, cells)
+        self._volume, self._inside_out = VolumeRatio(self.formulation, cells), inside_out(material)
         self.contributions = tuple(self._contributions(viscosity, relaxation, thermoelastic))
 
     def _contributions(
@@ -204,6 +204,10 @@ class Solid(Term):
         """Name the body if an element is inverted. Collective."""
         smallest = self.smallest_jacobian()
         return f"{self.name}: element inverted, smallest J = {smallest:.3g}" if not smallest > 0 else None
+
+    def possible(self) -> bool:
+        """Whether no element is turned inside out, where that has no energy. Collective."""
+        return self._inside_out or self.smallest_jacobian() > 0
 
     def smallest_jacobian(self) -> float:
         """Smallest det F at the integration points. Collective."""

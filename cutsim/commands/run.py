@@ -20,10 +20,7 @@ EXAMPLES = (
     "cutsim run mine.toml -n 2 --overwrite",
 )
 
-_ADVICE = (
-    "Where a crack has begun to run by itself, a little viscosity in [body] carries the run across. "
-    'What else may be the cause is in the user guide, under "When a step fails".'
-)
+_ADVICE = 'What may be the cause, and what helps, is on the page "When a run does not converge" of the documentation.'
 
 
 def command(

@@ -49,6 +49,7 @@ class Pace:
         smooth: Whether the last step tells where the next one leads.
         path: Size of the next step along the equilibrium path, 0 for a step in time [energy].
         turned: Whether the path had to be followed before.
+        drag: Force on a node over its velocity while a brake acts, else 0 [force·time/length].
     """
 
     control: str = ""
@@ -56,6 +57,7 @@ class Pace:
     smooth: bool = False
     path: float = 0.0
     turned: bool = False
+    drag: float = 0.0
 
 
 class State:

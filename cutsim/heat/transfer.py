@@ -84,6 +84,10 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
         """None: heat needs time to go on."""
 
     @property
+    def brake(self) -> None:
+        """None: heat does not jump."""
+
+    @property
     def fields(self) -> Mapping[str, Expr]:
         """Fields of the solution for output, by name."""
         return {"temperature": self.temperature.value}

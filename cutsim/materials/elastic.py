@@ -6,6 +6,7 @@ do not lock.  P = ∂W/∂F and the tangent are derived by UFL.
 """
 
 from dataclasses import dataclass
+from math import isfinite
 from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
@@ -50,6 +51,14 @@ def engineering_constants(shear: float, bulk: float) -> tuple[float, float]:
 def volumetric_energy(material: Material, F: NDArray[np.float64]) -> float:
     """Volumetric part of the strain energy of a deformation gradient, 3 × 3 numbers [energy/length³]."""
     return float(material.energy(ufl.as_matrix(F.tolist()))[1](()))
+
+
+def inside_out(material: Material) -> bool:
+    """Whether a strain energy has a value for what is turned inside out, as one of small strain has."""
+    try:
+        return isfinite(sum(part(()) for part in material.energy(ufl.as_matrix(np.diag([-0.5, 1.0, 1.0]).tolist()))))
+    except (ValueError, TypeError):  # the logarithm, or a power, of a negative number
+        return False
 
 
 class WithoutPlaneStress:

@@ -31,6 +31,7 @@ ENERGIES = {
     "energy_friction": ("friction", "#E69F00"),
     "energy_viscous": ("viscous", "#999999"),
     "energy_cohesive_viscous": ("viscosity of the bond", "#66a61e"),
+    "energy_braked": ("brake where the run jumped", "#a6761d"),
     "energy_numerical": ("numerical", "#000000"),
 }
 

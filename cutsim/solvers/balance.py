@@ -12,7 +12,7 @@ from cutsim.base.borders import Bordered
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr
 from cutsim.base.places import Places
-from cutsim.base.terms import Columns, Constrained, Diagnosing, Showing, Term, offering
+from cutsim.base.terms import Bounded, Columns, Constrained, Diagnosing, Showing, Term, offering
 from cutsim.fields.constraints import Constraints, Prescribed
 from cutsim.fields.state import State
 from cutsim.solvers.directions import Directions, Guided
@@ -104,6 +104,7 @@ class Balance(Generic[T, H]):
                 borders=[b for t in offering(terms, Bordered) if (b := t.border) is not None],
                 interface_dofs=interface_dofs,
                 directions=directions,
+                bounds=[t.possible for t in offering(terms, Bounded)],
             ),
             **solver,
         )

@@ -123,6 +123,15 @@ class NonlinearProblem:
         self._iterations.line_search = kept.line_search
         self._iterations.linear.use(kept.linear_solver)
 
+    @property
+    def drag(self) -> float:
+        """Stiffness of a force at each dof against its displacement; none at first [force/length]."""
+        return self._system.drag
+
+    @drag.setter
+    def drag(self, drag: float) -> None:
+        self._system.drag = drag
+
     def solve(self, line_search: str | None = None) -> Outcome:
         """Solve from the present u.
 

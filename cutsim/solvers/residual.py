@@ -27,6 +27,7 @@ class Residual:
     Attributes:
         n: Number of owned dofs.
         known: Owned forces that are added to those of the form.
+        drag: Stiffness against the displacement of each dof, whose forces are added, too [force/length].
         fixed: Which owned unknowns have a Dirichlet condition ...
         held: ... and their indices.
     """
@@ -50,6 +51,7 @@ class Residual:
         self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
         self._added = owned_vector(*layout)
         self.known: Array = np.zeros(self.n)
+        self.drag = 0.0
         self.fixed: NDArray[np.bool_] = np.zeros(self.n, dtype=bool)
         for bc in self._bcs:
             dofs = bc.dof_indices()[0]
@@ -100,7 +102,7 @@ class Residual:
             for a in self._a:
                 fem.apply_lifting(r, [a], [bcs], [self._u.x.array], -1.0)
         self._r.scatter_reverse(la.InsertMode.add)
-        r[: self.n] += self.known
+        r[: self.n] += self.known + self.drag * self._u.x.array[: self.n]
         if self._assemblers:
             self._add_assembled(lift)
         return r[: self.n]

@@ -1,6 +1,6 @@
 """Nonlinear equations in terms of vectors: unknowns, residual, tangent."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +31,8 @@ class Structure:
         borders: A few unknowns more, with their equations, to which displacements may be tied.
         interface_dofs: Owned (blocked) dofs on both faces of all cracks; selects the solver for cracks.
         directions: What is prescribed along directions that are no components.
+        bounds: Each tells whether the present displacement is possible; the residual of one that is not is no number,
+            which makes a line search go back.
     """
 
     symmetric: bool = False
@@ -39,6 +41,7 @@ class Structure:
     borders: Sequence[Border] = ()
     interface_dofs: NDArray[np.int32] | None = None
     directions: Directions | None = None
+    bounds: Sequence[Callable[[], bool]] = ()
 
 
 #: Nothing is known.
@@ -103,6 +106,15 @@ class System:
         return comm
 
     @property
+    def drag(self) -> float:
+        """Stiffness against the displacement of each dof [force/length]."""
+        return self.forces.drag
+
+    @drag.setter
+    def drag(self, drag: float) -> None:
+        self.forces.drag = self.tangent.drag = drag
+
+    @property
     def unknowns(self) -> NDArray[np.float64]:
         """A copy of the owned unknowns."""
         u = self.directions.turn(self._u.x.array[: self.forces.n])
@@ -141,6 +153,9 @@ class System:
         self.reaction = np.concatenate([b[self.forces.held], self._borders.loads])
         b[self.held] = self.violation(x)
         b[self._borders.tied] = 0.0
+        # all of them take part: a list, because all() would stop at the first
+        if not all([possible() for possible in self.structure.bounds]):
+            b[:] = np.nan
         return b
 
     def assemble_tangent(self, x: NDArray[np.float64]) -> None:

@@ -31,6 +31,7 @@ class Tangent:
 
     Attributes:
         A: The matrix.
+        drag: Stiffness that is added to the diagonal of the free rows.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class Tangent:
     ) -> None:
         self._a, self._V, self._symmetric, self._assemblers = tuple(a), V, symmetric, tuple(assemblers)
         self._directions = directions or Directions(V)
+        self.drag = 0.0
         pattern = compat.sparsity_pattern(self._a)
         pattern.finalize()
         if V.mesh.comm.size == 1:
@@ -107,7 +109,15 @@ class Tangent:
             self._sum.ptap(self._axes, result=self.A)
             rows = self._directions.held if held else self._directions.held[:0]
             self.A.zeroRowsColumns(rows + self.A.getOwnershipRange()[0])
+        if self.drag:
+            self._add_drag(bcs)
         self.A.getDiagonal(self._diagonal)
+
+    def _add_drag(self, bcs: Sequence[fem.DirichletBC]) -> None:
+        self._mark_free(bcs)
+        self._diagonal.array[self._directions.held] = 0.0
+        self._diagonal.scale(self.drag)
+        self.A.setDiagonal(self._diagonal, PETSc.InsertMode.ADD_VALUES)
 
     def _assemble_forms(self, bcs: Sequence[fem.DirichletBC]) -> None:
         if self._csr is None:
@@ -126,15 +136,18 @@ class Tangent:
         for assembler in self._assemblers:
             assembler.add_tangent(added)
         added.assemble()
-        # for the time being the vector of the diagonal marks the free rows
-        self._diagonal.set(1.0)
-        for bc in bcs:
-            dofs = bc.dof_indices()[0]
-            self._diagonal.array[dofs[dofs < self._diagonal.local_size]] = 0.0
+        self._mark_free(bcs)
         added.diagonalScale(self._diagonal, self._diagonal)
         self._sum.zeroEntries()
         for part in (self._forms, added):
             self._sum.axpy(1.0, part, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+
+    def _mark_free(self, bcs: Sequence[fem.DirichletBC]) -> None:
+        """For the time being the vector of the diagonal is 1 in the free rows, else 0."""
+        self._diagonal.set(1.0)
+        for bc in bcs:
+            dofs = bc.dof_indices()[0]
+            self._diagonal.array[dofs[dofs < self._diagonal.local_size]] = 0.0
 
     @property
     def diagonal(self) -> NDArray[np.float64]:
