@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from functools import cache
 
-from cutsim.fields.laminate import SIDES, laminate
+from cutsim.fields.laminate import HALVES, SIDES, laminate
 from cutsim.fields.meshing import geometries, geometry
 
 #: The geometry that is made of the layers in ``[[layers]]``, by `cutsim.laminate`.
@@ -43,4 +43,4 @@ def outline(name: str) -> Outline:
 def laminate_outline(layers: tuple[str, ...]) -> Outline:
     """Outline of a block of layers, by their names."""
     keywords = [p for p in inspect.signature(laminate).parameters.values() if p.kind is p.KEYWORD_ONLY]
-    return Outline(tuple(p.name for p in keywords), (*SIDES, *layers, *(f"crack_{layer}" for layer in layers)))
+    return Outline(tuple(p.name for p in keywords), (*SIDES, *HALVES, *layers, *(f"crack_{layer}" for layer in layers)))

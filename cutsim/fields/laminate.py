@@ -15,6 +15,8 @@ from cutsim.fields.meshing import Marker, TaggedMesh, tag_mesh
 
 #: Sides of the block; names that no layer may have.
 SIDES = ("notch", "top_left", "top_right", "bottom", "far_left", "far_right", "front", "back")
+#: The two sides of the crack of a body of revolution, which no layer may have as a name either.
+HALVES = ("left", "right")
 
 _GROWTH = 1.3  # ratio of neighbouring sizes beside the band
 
@@ -31,6 +33,7 @@ def laminate(
     least: int = 2,
     width: float | None = None,
     rows: int = 4,
+    thread: float | None = None,
 ) -> TaggedMesh:
     """Mesh a block of layers, quadrilaterals or hexahedra. Collective.
 
@@ -38,23 +41,30 @@ def laminate(
     meshes/block.geo).  Groups of cells are the layers; groups of facets are "crack_<layer>" for each layer that the
     notch does not cut through, and `SIDES`, "front" and "back" in 3-D and "notch" with a notch only.
 
+    With a `thread` it is the meridian plane of a body of revolution about x = 0 (the frame of meshes/thread.geo): the
+    crack is at x = `thread`, and there are the groups of cells "left", the thread, and "right", all else, but no
+    facets "far_left".
+
     Args:
         comm: Communicator over which the mesh is distributed.
         layers: Name → thickness from the top downwards [length].
-        length: Length of each of the two halves [length].
+        length: Length of each of the two halves, or from the crack to the rim of a body of revolution [length].
         size: Largest element along the crack plane and across it within the band [length].
         band: Half width of the zone of uniform size about the crack plane, beside which elements grow [length].
         notch: Depth of the notch from the top, less than that of the block [length].
         least: Elements through a layer, at least; thin layers have no more.
         width: Width along z of a block in 3-D, from z = 0 on; None for the plane [length].
         rows: Elements across the width.
+        thread: Radius of the thread about the axis of a body of revolution, which has no width; None for a block.
 
     Raises:
         ValueError: On all ranks, if a number is outside its range or a layer has no name of its own.
     """
     height = sum(layers.values())
     require("layers", dict(layers), len(layers) > 0 and min(layers.values()) > 0, "at least one, of thickness > 0")
-    require("layers", list(layers), not set(layers) & set(SIDES), f"names other than {', '.join(SIDES)}")
+    require(
+        "layers", list(layers), not set(layers) & {*SIDES, *HALVES}, f"names other than {', '.join(SIDES + HALVES)}"
+    )
     require_number("size", size, positive)
     require_number("length", length, positive)
     require_number("band", band, between(0, length, "(]", name="length"))
@@ -62,12 +72,15 @@ def laminate(
     require_number("least", least, count(1))
     require_number("width", width, positive.or_none)
     require_number("rows", rows, count(1))
+    require_number("thread", thread, positive.or_none)
+    require("width", width, width is None or thread is None, "None for a body of revolution")
     half = _graded(length, size, band)
     bounds = -np.concatenate([[0.0], np.cumsum(list(layers.values()))])
-    lines = [np.concatenate([-half[:0:-1], half]), _down(bounds, size, notch, least)[::-1]]
+    across = np.concatenate([-half[:0:-1], half]) if thread is None else np.append(0.0, thread + half)
+    lines = [across, _down(bounds, size, notch, least)[::-1]]
     if width is not None:
         lines.append(np.linspace(0.0, width, rows + 1))
-    cells, facets = _markers(layers, bounds, length, notch, width)
+    cells, facets = _markers(layers, bounds, across, thread or 0.0, notch, width)
     return tag_mesh(_grid(comm, lines), cells, facets)
 
 
@@ -105,11 +118,11 @@ def _grid(comm: MPI.Comm, lines: list[Array]) -> Mesh:
 
 
 def _markers(
-    layers: Mapping[str, float], bounds: Array, length: float, notch: float, width: float | None
+    layers: Mapping[str, float], bounds: Array, across: Array, crack: float, notch: float, width: float | None
 ) -> tuple[dict[str, Marker], dict[str, Marker]]:
-    """Markers of the groups of cells and of facets."""
-    bottom = bounds[-1]
-    slack = 1e-9 * max(length, -bottom)
+    """Markers of the groups of cells and of facets of a block between the ends of `across`, with the crack at x."""
+    bottom, near, far = bounds[-1], across[0], across[-1]
+    slack = 1e-9 * max(far, -bottom)
 
     def between(axis: int, low: float, high: float) -> Marker:
         return lambda x: (x[axis] > low - slack) & (x[axis] < high + slack)
@@ -117,7 +130,7 @@ def _markers(
     def both(first: Marker, second: Marker) -> Marker:
         return lambda x: first(x) & second(x)
 
-    middle = between(0, 0.0, 0.0)
+    middle = between(0, crack, crack)
     cells, facets = {}, {}
     for name, (top, low) in zip(layers, pairwise(bounds), strict=True):
         cells[name] = between(1, low, top)
@@ -125,10 +138,13 @@ def _markers(
             facets[f"crack_{name}"] = both(middle, between(1, low, min(top, -notch)))
     if notch:
         facets["notch"] = both(middle, between(1, -notch, 0.0))
-    facets["top_left"] = both(between(1, 0.0, 0.0), between(0, -length, 0.0))
-    facets["top_right"] = both(between(1, 0.0, 0.0), between(0, 0.0, length))
-    facets["bottom"] = between(1, bottom, bottom)
-    facets["far_left"], facets["far_right"] = between(0, -length, -length), between(0, length, length)
+    facets["top_left"] = both(between(1, 0.0, 0.0), between(0, near, crack))
+    facets["top_right"] = both(between(1, 0.0, 0.0), between(0, crack, far))
+    facets["bottom"], facets["far_right"] = between(1, bottom, bottom), between(0, far, far)
+    if near < 0:
+        facets["far_left"] = between(0, near, near)
+    else:
+        cells["left"], cells["right"] = between(0, near, crack), between(0, crack, far)
     if width is not None:
         facets["front"], facets["back"] = between(2, 0.0, 0.0), between(2, width, width)
     return cells, facets

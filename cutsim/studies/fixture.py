@@ -38,7 +38,7 @@ class Fixture:
         symmetry: Facets in the plane of symmetry that halves body and tool; used if the mesh has this group.
         walls: Facets that are held along the edge of the tool: a body between two of them is in plane strain.
         ends: Facets at the far ends, one group on either side of the crack plane, which are held along its normal; they
-            are free if there are none.
+            are free if there are none. In a body of revolution they are one group, its rim.
         drawn: Way by which each end is drawn outwards while the tool comes into the notch [length].
         thread: Cells of the thread in a body of revolution, which stays on the axis.
 
@@ -91,9 +91,9 @@ class Fixture:
     def supports(self, body: CrackedBody, frame: Frame, entry_time: float) -> list[Support]:
         """All that holds the body beside the plate. Collective."""
         domain, edge = body.domain, frame.edge
-        if body.state.axisymmetric:
-            return [Support(body.state, domain.cells(self.thread), 0, dim=2)]
         parts = [self._end(body, frame, name, entry_time) for name in self.ends]
+        if body.state.axisymmetric:
+            return [*parts, Support(body.state, domain.cells(self.thread), 0, dim=2)]
         line = _line(body, frame)
         if not self.ends:
             parts.append(_held(body, line, frame.normal, dim=0))
