@@ -79,3 +79,15 @@ def test_an_element_that_is_inside_out_is_no_iterate(material):
     outcome = mechanics.solve("bt")
     assert outcome.converged == small
     assert small or (outcome.iterations == 0 and "not finite" in outcome.message)
+
+
+def test_what_a_jump_sets_free_is_no_fault_of_a_viscosity(jump):
+    """It takes a part, and the brake the rest."""
+    time, before, after = jump
+    bar = Bar.build(LAW, viscosity=1e-4)
+    bar.run(1.2 * time, NEVER, closure=CLOSURE)
+    audit = bar.mechanics.audit
+    taken = audit.entries["viscous"] + audit.entries["braked"]
+    assert taken == pytest.approx(set_free(time, before, after), rel=0.05)
+    assert audit.entries["viscous"] > 0.1 * audit.scale
+    assert "viscosity" not in bar.state.verdict.doubts

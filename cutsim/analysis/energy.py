@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from cutsim.base.checks import require
-from cutsim.base.terms import ENTRIES
+from cutsim.base.terms import ENTRIES, STORED
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,11 @@ class EnergyAudit:
         turnover = max(abs(external), sum(abs(v) for v in entries.values()))
         after = replace(self, external=external, entries=entries, scale=max(self.scale, turnover))
         return replace(after, missed=max(self.missed, abs(after.gap)))
+
+    @property
+    def stored(self) -> float:
+        """What bodies, bonds and contacts hold [energy]."""
+        return sum(self.entries[name] for name in STORED)
 
     @property
     def gap(self) -> float:

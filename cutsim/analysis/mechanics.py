@@ -131,7 +131,7 @@ class Mechanics(Balance[Term, Support]):
         # beyond the largest load there may be no other equilibrium in which a body comes to rest
         rests = self.inertia is None and not offering(terms, Advising)
         self.brake = Brake(self.problem, state) if rests else None
-        self._resisted = state.memory.value("mechanics: viscous work, and the part against the load", (0.0, 0.0))
+        self._resisted = state.memory.value("mechanics: viscous work, and what is not set free by the body", (0.0, 0.0))
         self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
     @property
@@ -250,10 +250,10 @@ class Mechanics(Balance[Term, Support]):
         """Say in the verdict of the state what makes the trial step, which is accepted, questionable. Collective."""
         super().watch()
         viscous = sum((t.viscous_work for t in offering(self.terms, Regularised)), start=0.0)
-        work = self.trial_audit.external - self.audit.external
         # what the body sets free by itself some viscosity has to take, however small it is
+        free = max(self.audit.stored - self.trial_audit.stored, 0.0)
         before, resisted = self._resisted.committed
-        self._resisted.trial = (viscous, resisted + min(viscous - before, max(work, 0.0)))
+        self._resisted.trial = (viscous, resisted + max(viscous - before - free, 0.0))
         doubt_audit(self.state.verdict, self.audit, self.trial_audit, self._resisted.trial[1])
         warn_of_brake(self.audit, self.trial_audit, self.state.time)
         doubt_way_back(self.state, self.audit, self.trial_audit)

@@ -25,6 +25,9 @@ ENTRIES = (
     "fracture", "friction", "viscous", "cohesive_viscous", "braked", "numerical",  # lost
 )  # fmt: skip
 
+#: Those of energy that bodies, bonds and contacts hold.
+STORED = ENTRIES[:5]
+
 #: Columns of a history row: name → (value, kind of quantity).
 Columns = dict[str, tuple[float, str]]
 
