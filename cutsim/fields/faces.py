@@ -139,8 +139,12 @@ class Face:
 
     def in_order_of(self, facets: NDArray[np.int32]) -> "Face":
         """The same facets, none of which is there twice, in another order."""
+        return self.some(self.order_of(facets))
+
+    def order_of(self, facets: NDArray[np.int32]) -> NDArray[np.int64]:
+        """Places of the same facets, none of which is there twice, in another order."""
         order = np.argsort(self.facets)
-        return self.some(order[np.searchsorted(self.facets, facets, sorter=order)])
+        return np.asarray(order[np.searchsorted(self.facets, facets, sorter=order)], dtype=np.int64)
 
 
 def rows(faces: Sequence[Face], cells: int) -> NDArray[np.int32]:

@@ -68,12 +68,18 @@ class FacetPoints:
         unique = np.unique(np.asarray(facets, dtype=np.int32))
         self.submesh, self.facets, self._entity_map = create_submesh(mesh, fdim, unique)
         self._owned = self.submesh.topology.index_map(fdim).size_local
-        self.weights = self._assemble({"one": ufl.as_ufl(1.0)})()["one"]
+        self.weights = self._rule = self._assemble({"one": ufl.as_ufl(1.0)})()["one"]
 
     @property
     def entity_maps(self) -> EntityMaps:
         """Map between facets of the mesh and cells of the submesh, for forms with functions of these points."""
         return {self.submesh: self._entity_map}
+
+    @property
+    def xi(self) -> Values:
+        """Reference coordinates of `ordered` points on their facets, shape (local facets, points, directions)."""
+        places = basix.make_quadrature(basix.CellType[self.submesh.topology.cell_name()], self.degree)[0]
+        return np.broadcast_to(places, (len(self.facets), *places.shape))
 
     def function(self, components: int = 1) -> fem.Function:
         """A function with a value, or a vector of values, at each point."""
@@ -132,7 +138,7 @@ class FacetPoints:
 
         def evaluate() -> dict[str, Values]:
             # the transposed weights broadcast over scalars and vectors alike
-            return {name: (values.T / self.weights.T).T for name, values in assemble().items()}
+            return {name: (values.T / self._rule.T).T for name, values in assemble().items()}
 
         return evaluate
 

@@ -32,14 +32,6 @@ class Points:
     frames: Array
 
     @classmethod
-    def on(cls, nodes: Array, sides: Array, tables: tuple[Array, Array]) -> Self:
-        """Points of each facet, with its nodes and the shape functions and derivatives at its points."""
-        dim = nodes.shape[-1]
-        x = np.einsum("qa,fai->fqi", tables[0], nodes).reshape(-1, dim)
-        tangents = np.einsum("qka,fai->fqki", tables[1], nodes).reshape(-1, dim - 1, dim)
-        return cls.framed(x, tangents, np.repeat(sides, len(tables[0])))
-
-    @classmethod
     def framed(cls, x: Array, tangents: Array, sides: Array) -> Self:
         """Points with frames along given tangents; the sides, one a point, tell which normal points outwards."""
         dim = x.shape[-1]

@@ -23,7 +23,7 @@ class FoldingSearch(PartnerSearch):
     The ray of a point also runs backwards through its own body, and its own back is never a partner.
 
     Args:
-        memory, name, slave, master, points, count, search, size: As of `PartnerSearch`.
+        memory, name, slave, master, points, search, size: As of `PartnerSearch`.
     """
 
     def __init__(
@@ -33,13 +33,12 @@ class FoldingSearch(PartnerSearch):
         slave: SlaveSurface,
         master: Master,
         points: Points,
-        count: int,
         *,
         search: float,
         size: float,
     ) -> None:
         self._touch, self._reference = BEHIND * size, (points, (slave.reference, master.reference))
-        super().__init__(memory, name, slave, master, points, count, search=search, size=size)
+        super().__init__(memory, name, slave, master, points, search=search, size=size)
 
     def dig_out(self) -> Hits:
         """Find partners from the start, also of points in another body: they meet its outside before their own back.
@@ -54,7 +53,7 @@ class FoldingSearch(PartnerSearch):
             hits = hits.some(inside[hits.points] & (hits.gap < -self._touch))
             # backs that lie in one plane are those of two bodies side by side
             hits = nearest(replace(hits, gap=hits.gap + self._touch * self._own(hits)))
-            left = inside & np.repeat(self._slave.owned, self._count)
+            left = inside & np.repeat(self._slave.owned, self._slave.count)
             left[hits.points] = False
             lost = self._slave.total(int(np.count_nonzero(left)))
             if lost and reach > largest:
@@ -75,13 +74,13 @@ class FoldingSearch(PartnerSearch):
         """Find the facets that are near each other, without those that look the same way, as neighbours do."""
         found = super()._look_around(points, nodes, reach, version)
         slaves, masters = found.facets
-        ways = points.frames[:: self._count, 0][slaves], self._outward(nodes[1])[masters]
+        ways = points.frames[:: self._slave.count, 0][slaves], self._outward(nodes[1])[masters]
         facing = np.einsum("ni,ni->n", *ways) < ALIKE
         return replace(found, facets=(slaves[facing], masters[facing]))
 
     def _own(self, hits: Hits) -> NDArray[np.bool_]:
         """Which partners are on the body of their points."""
-        return np.asarray(self._slave.pieces[hits.points // self._count] == self._master.pieces[hits.facets])
+        return np.asarray(self._slave.pieces[hits.points // self._slave.count] == self._master.pieces[hits.facets])
 
     def _entered(self, hits: Hits) -> NDArray[np.bool_]:
         """Which partners are in front of their points, or behind because the points have come into the body.
@@ -91,7 +90,7 @@ class FoldingSearch(PartnerSearch):
         known = self._known.committed
         rows = np.flatnonzero(hits.gap < -self._touch)
         behind = hits.some(rows)
-        own = self._slave.global_nodes[behind.points // self._count]
+        own = self._slave.global_nodes[behind.points // self._slave.count]
         beside = (own[:, :, None] == self._master.global_nodes[behind.facets][:, None]).any(axis=(1, 2))
         pressed = known.met[behind.points] | ~self._own(behind)
         deep = self._touch + np.where(pressed, 2 * known.deep, 0.0)

@@ -36,22 +36,21 @@ class MaterialPartners(PairKinematics):
     ) -> None:
         super().__init__(slave, master)
         nodes = slave.reference, master.reference
-        points, count = self._points(nodes[0]), len(self.tables[0])
-        found = PartnerSearch(memory, name, slave, master, points, count, search=search, size=size)
+        points = self._points(nodes[0])
+        found = PartnerSearch(memory, name, slave, master, points, search=search, size=size)
         self._hits = hits = found.begin(points, nodes)
         self._values, derivatives = master.shape.values(hits.xi)
         # the lines of the slave's reference coordinates, in those of the master
         master_tangents = np.einsum("nkb,nbi->nki", derivatives, nodes[1][hits.facets])
         lines = points.tangents[hits.points] @ np.linalg.pinv(master_tangents)
         self._midway = 0.5 * np.einsum("nkl,nlb->nkb", lines, derivatives)
-        self._sides = np.repeat(slave.sides, count)
         self._offset = np.zeros((len(hits.points), points.x.shape[-1]))
         self._offset = self.pairs(nodes).jump[hits.points]
 
     @property
     def facets(self) -> tuple[Indices, Indices]:
         """Slave and master facets that are bonded."""
-        both = np.stack([self._hits.points // len(self.tables[0]), self._hits.facets], axis=1)
+        both = np.stack([self.slave.facets_of(self._hits.points), self._hits.facets], axis=1)
         slave, master = np.unique(both, axis=0).T
         return slave, master
 

@@ -38,7 +38,7 @@ class Action:
 
     def _facets(self, rows: Indices) -> Indices:
         """Slave facets of some pairs."""
-        return self.pairs.hits.points[rows] // len(self.kinematics.tables[0])
+        return self.kinematics.slave.facets_of(self.pairs.hits.points[rows])
 
     def nodes(self, rows: Indices) -> Indices:
         """Global nodes on which some pairs act, those of the slave facet first."""
@@ -69,7 +69,7 @@ class Action:
         blocks = np.einsum("nr,nicj->nricj", self.interpolation(rows), by_nodes)
         if pairs.on_ray is not None and d_xi is not None:
             # the place on the master facet moves, and with it the share of its nodes
-            ns = self.kinematics.tables[0].shape[1]
+            ns = self.kinematics.slave.values.shape[1]
             share = np.einsum("nkr,nkpj,npc->nrcj", pairs.on_ray.derivatives[rows], d_xi, primitives)
             blocks[:, ns:] += np.einsum("ni,nrcj->nricj", self._weighted(rows), share)
         return blocks
@@ -80,8 +80,7 @@ class Action:
 
     def interpolation(self, rows: Indices) -> Array:
         """Nodal factors of the jump of a field, master minus slave, shape (rows, nodes)."""
-        values = self.kinematics.tables[0]
-        return np.hstack([-values[self.pairs.hits.points[rows] % len(values)], self.pairs.values[rows]])
+        return np.hstack([-self.kinematics.slave.values[self.pairs.hits.points[rows]], self.pairs.values[rows]])
 
     def _weighted(self, rows: Indices) -> Array:
         """Traction vectors times weights."""
@@ -90,12 +89,11 @@ class Action:
 
     def _primitives(self, rows: Indices) -> Array:
         """Nodal factors of the primitives, shape (rows, primitives, nodes)."""
-        values, derivatives = self.kinematics.tables
-        ns, q = values.shape[1], self.pairs.hits.points[rows] % len(values)
-        count = derivatives.shape[1] + 2
+        slave, points = self.kinematics.slave, self.pairs.hits.points[rows]
+        ns, count = slave.values.shape[1], slave.derivatives.shape[1] + 2
         factors = np.zeros((len(rows), count, ns + self.pairs.values.shape[1]))
-        factors[:, 0, :ns] = values[q]
-        factors[:, 1:-1, :ns] = derivatives[q]
+        factors[:, 0, :ns] = slave.values[points]
+        factors[:, 1:-1, :ns] = slave.derivatives[points]
         factors[:, -1, ns:] = self.pairs.values[rows]
         if self.pairs.midway is not None:
             factors[:, 1:-1, :ns] *= 0.5
@@ -135,7 +133,7 @@ class Coupling:
         points, *rows = np.intersect1d(hits[0].points, hits[1].points, assume_unique=True, return_indices=True)
         coupled = np.any(self.stiffness[points], axis=(1, 2)) & (self.contact.weights[points] > 0)
         contact, bond = (some[coupled] for some in rows)
-        slave = points[coupled] // len(self.contact.kinematics.tables[0])
+        slave = self.contact.kinematics.slave.facets_of(points[coupled])
         order = np.lexsort((hits[1].facets[bond], hits[0].facets[contact], slave))
         return contact[order], bond[order]
 

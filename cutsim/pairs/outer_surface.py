@@ -1,5 +1,6 @@
 """Facets on the boundary of a body, outer or at a cut, and their nodes, distributed or gathered on every rank."""
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
 
@@ -15,7 +16,7 @@ from cutsim.fields.faces import Face
 from cutsim.fields.pieces import mesh_pieces
 from cutsim.fields.points import FacetPoints
 from cutsim.pairs.overlap import inside_body
-from cutsim.pairs.pairing import Array, FacetShape, Indices
+from cutsim.pairs.pairing import Array, FacetShape, Hits, Indices
 
 
 class OuterSurface:
@@ -82,12 +83,43 @@ class SlaveSurface(OuterSurface):
         points: Integration points of the facets.
 
     Attributes:
-        places: Places of the points, flattened over the facets.
+        count: Number of points on a facet.
+        values: Shape functions at the points, shape (points, nodes), flattened over the facets.
+        derivatives: Their derivatives, shape (points, directions, nodes).
+        weighted: Which points have a weight; others are where the first point of their facet is.
+        places: Places of arrays of point values, flattened over the facets.
     """
 
     def __init__(self, V: fem.FunctionSpace, face: Face, points: FacetPoints) -> None:
         super().__init__(V, face.in_order_of(points.facets))
-        self.places = points.flat_places
+        self.places, self.weighted, xi = points.flat_places, points.weights.ravel() > 0, points.xi
+        self.count = xi.shape[1]
+        self.values, self.derivatives = self.shape.values(xi.reshape(-1, xi.shape[-1]))
+
+    def facets_of(self, points: Indices) -> Indices:
+        """Facets of some points."""
+        return points // self.count
+
+    def completed(self, hits: Hits) -> Hits:
+        """Partners also of the points without weight, from those of the others."""
+        spare = np.flatnonzero(~self.weighted)
+        if not len(spare):
+            return hits
+        row = np.full(len(self.weighted), -1)
+        row[hits.points] = np.arange(len(hits.points))
+        row[spare] = row[self.facets_of(spare) * self.count]
+        points = np.flatnonzero(row >= 0)
+        return replace(hits.some(row[points]), points=points)
+
+    def at_points(self, nodes: Array) -> Array:
+        """Values at the points of a field on the nodes of the facets, shape (facets, nodes, components)."""
+        values = np.einsum("fqa,fai->fqi", self.values.reshape(-1, self.count, nodes.shape[1]), nodes)
+        return values.reshape(-1, nodes.shape[-1])
+
+    def tangents(self, nodes: Array) -> Array:
+        """Tangents of the facets at the points, shape (points, directions, dimension)."""
+        shaped = self.derivatives.reshape(-1, self.count, *self.derivatives.shape[1:])
+        return np.einsum("fqka,fai->fqki", shaped, nodes).reshape(-1, shaped.shape[2], nodes.shape[-1])
 
 
 class Master(Protocol):

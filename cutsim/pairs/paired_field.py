@@ -2,7 +2,6 @@
 
 from typing import Self
 
-import basix
 import numpy as np
 from dolfinx import fem
 
@@ -37,9 +36,9 @@ class PairedField:
     def __init__(self, space: fem.FunctionSpace, points: FacetPoints, slave: Face, master: Face | None) -> None:
         self.slave = OuterSurface(space, slave)
         self.master = None if master is None else SharedSurface(OuterSurface(space, master))
-        places = basix.make_quadrature(self.slave.shape.element.cell_type, points.degree)[0]
-        self._own = np.tile(self.slave.shape.values(places)[0], (len(self.slave.owned), 1))
-        self._facets: Indices = np.repeat(np.arange(len(self.slave.owned)), len(places))
+        xi = points.xi
+        self._own = self.slave.shape.values(xi.reshape(-1, xi.shape[-1]))[0]
+        self._facets: Indices = np.repeat(np.arange(len(xi)), xi.shape[1])
 
     def pair(self, hits: Hits) -> None:
         """Take over the partners of the points."""

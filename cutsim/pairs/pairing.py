@@ -129,7 +129,7 @@ def project(
     points, facets = pairs
     y, near = _in_frames(x, frames, points, facets, master, search)
     points, facets = points[near], facets[near]
-    xi = _solve(y[..., 1:], shape)
+    xi = solve(y[..., 1:], shape)
     values, derivatives = shape.values(xi)
     # in the frame of a point its ray is the first axis: along it lies the gap, and the rest is what Newton's method has
     # left over where it did not converge
@@ -137,7 +137,7 @@ def project(
     off = np.abs(np.einsum("nb,nbi->ni", values, y[..., 1:])).max(axis=-1, initial=0.0)
     size = np.abs(y - y[:, :1]).max(axis=(1, 2), initial=0.0)
     # a ray within the plane of a facet meets neither its outside nor its inside
-    across = _determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:]))
+    across = determinant(np.einsum("nab,nbi->nia", derivatives, y[..., 1:]))
     outside = sides[facets] * across < -EDGE * size ** derivatives.shape[1]
     # where surfaces touch, rounding is not to tell which of the facets at an edge is nearer
     gap[np.abs(gap) <= TOUCH * size] = 0.0
@@ -174,7 +174,7 @@ def _in_frames(
     return np.einsum("nij,nbj->nbi", frames[points], master[facets] - x[points, None]), near
 
 
-def _solve(y: Array, shape: FacetShape) -> Array:
+def solve(y: Array, shape: FacetShape) -> Array:
     """Reference coordinates at which facets pass through the origin of the plane, by Newton's method."""
     centre = shape.centre
     xi = np.tile(centre, (len(y), 1))
@@ -196,10 +196,11 @@ def inverse(A: Array) -> Array:
     if A.shape[-1] == 1:
         return np.asarray(1 / A)
     adjugate = np.stack([A[..., 1, 1], -A[..., 0, 1], -A[..., 1, 0], A[..., 0, 0]], axis=-1).reshape(A.shape)
-    return np.asarray(adjugate / _determinant(A)[:, None, None])
+    return np.asarray(adjugate / determinant(A)[:, None, None])
 
 
-def _determinant(A: Array) -> Array:
+def determinant(A: Array) -> Array:
+    """Determinants of 1 × 1 or 2 × 2 matrices, shape (n, d, d)."""
     if A.shape[-1] == 1:
         return np.asarray(A[..., 0, 0])
     return np.asarray(A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0])

@@ -1,6 +1,5 @@
 """Kinematics of a pair: partners of the slave points, opening and slide (docs/theory.md §3.5)."""
 
-import basix
 import numpy as np
 
 from cutsim.base.memory import Memory
@@ -22,15 +21,11 @@ class PairKinematics:
         slave: The slave surface.
         master: The master surface.
 
-    Attributes:
-        tables: Shape functions and derivatives at the points of a slave facet.
     """
 
     def __init__(self, slave: SlaveSurface, master: Master) -> None:
         self.slave, self.master = slave, master
-        shape = slave.shape.element
-        places = basix.make_quadrature(shape.cell_type, DEGREES[shape.degree])[0]
-        self.tables = slave.shape.values(places)
+        self._sides = np.repeat(slave.sides, slave.count)
 
     @property
     def facets(self) -> tuple[Indices, Indices]:
@@ -55,13 +50,9 @@ class PairKinematics:
         """Global nodes of some slave facets and of as many master facets, side by side."""
         return np.hstack([self.slave.global_nodes[slave], self.master.global_nodes[master]])
 
-    def interpolate(self, nodes: Array) -> Array:
-        """Values at the points of a field on the nodes of the slave facets."""
-        return np.einsum("qa,fai->fqi", self.tables[0], nodes).reshape(-1, nodes.shape[-1])
-
     def at_stencil(self, field: Array, pairs: Pairs, rows: Indices) -> Array:
         """Values of a field over the local dofs at the nodes on which some pairs act, slave facet first."""
-        slave = self.slave.gather(field)[pairs.hits.points[rows] // len(self.tables[0])]
+        slave = self.slave.gather(field)[self.slave.facets_of(pairs.hits.points[rows])]
         return np.concatenate([slave, self.master.gather(field)[pairs.hits.facets[rows]]], axis=1)
 
     def begin(self, nodes: tuple[Array, Array]) -> None:
@@ -75,7 +66,7 @@ class PairKinematics:
         raise NotImplementedError
 
     def _points(self, nodes: Array) -> Points:
-        return Points.on(nodes, self.slave.sides, self.tables)
+        return Points.framed(self.slave.at_points(nodes), self.slave.tangents(nodes), self._sides)
 
 
 class CurrentPartners(PairKinematics):
@@ -117,9 +108,8 @@ class CurrentPartners(PairKinematics):
         self._old, self._old_nodes = points, nodes
         rest = np.zeros((len(points.x), points.x.shape[-1] - 1))
         self._slid = memory.value(f"{name}: slide", rest, places=slave.places)
-        count = len(self.tables[0])
         kind = FoldingSearch if folding else PartnerSearch
-        self.partners = kind(memory, name, slave, master, points, count, search=search, size=size)
+        self.partners = kind(memory, name, slave, master, points, search=search, size=size)
         self._old_hits = self.partners.dig_out()
 
     @property

@@ -62,7 +62,6 @@ class PartnerSearch:
         slave: The slave surface.
         master: The master surface.
         points: Points of the slave in the reference configuration.
-        count: Points on a facet.
         search: Largest distance of a partner [length]. Points that were in the body of the master from the start, or
             come into it during a step, find theirs at any depth.
         size: Mean size of the slave facets [length].
@@ -75,13 +74,11 @@ class PartnerSearch:
         slave: SlaveSurface,
         master: Master,
         points: Points,
-        count: int,
         *,
         search: float,
         size: float,
     ) -> None:
         self._slave, self._master, self._search, self._margin = slave, master, search, MARGIN * size
-        self._count = count
         nodes = slave.reference, master.reference
         self._start = points, nodes
         known = _Known(np.zeros(len(points.x), dtype=bool))
@@ -131,7 +128,7 @@ class PartnerSearch:
     def hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
         """Where the rays of the points first meet the master."""
         hits = self._met(points, nodes, self._reach(nodes))
-        return nearest(hits.some(self._entered(hits)))
+        return self._slave.completed(nearest(hits.some(self._entered(hits))))
 
     def _met(self, points: Points, nodes: tuple[Array, Array], reach: float) -> Hits:
         """All places where the rays of the points meet the master."""
@@ -139,8 +136,9 @@ class PartnerSearch:
             # what has come near is no part of the step: it stays known if the step is given up
             self._found.value = self._look_around(points, nodes, reach, self.version)
         slaves, masters = self.facets
-        of_facet = slaves[:, None] * self._count + np.arange(self._count)
-        pairs = of_facet.ravel(), np.repeat(masters, self._count)
+        of_facet = (slaves[:, None] * self._slave.count + np.arange(self._slave.count)).ravel()
+        weighted = self._slave.weighted[of_facet]
+        pairs = of_facet[weighted], np.repeat(masters, self._slave.count)[weighted]
         return project(points.x, points.frames, pairs, nodes[1], self._master.sides, self._master.shape, reach)
 
     @property
@@ -164,7 +162,7 @@ class PartnerSearch:
         depth = np.zeros(len(points.x))
         lost = inside.copy()
         lost[hits.points] = False
-        rows = np.flatnonzero(lost & np.repeat(self._slave.owned, self._count))
+        rows = np.flatnonzero(lost & self._slave.weighted & np.repeat(self._slave.owned, self._slave.count))
         if len(rows) and len(nodes[1]):
             distance, closest = cKDTree(nodes[1].mean(axis=1)).query(points.x[rows])
             facing = np.einsum("ni,ni->n", self._outward(nodes[1])[closest], points.frames[rows, 0])
@@ -214,7 +212,7 @@ class PartnerSearch:
     def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float, version: int) -> Found:
         """Find the facets that are near each other."""
         ray = reach * points.frames[:, 0]
-        shape = len(nodes[0]), self._count, points.x.shape[-1]
+        shape = len(nodes[0]), self._slave.count, points.x.shape[-1]
         rays = np.concatenate([(points.x + ray).reshape(shape), (points.x - ray).reshape(shape)], axis=1)
         return Found(near_facets(rays, nodes[1], self._margin), nodes, reach, version + 1)
 

@@ -1,6 +1,7 @@
 """Large sliding between two surfaces with different meshes (docs/theory.md §3.5; thesis 4.28–4.57)."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import ufl
@@ -23,6 +24,7 @@ from cutsim.pairs.material_partners import MaterialPartners
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface, SlaveSurface
 from cutsim.pairs.pair_law import PairLaws
 from cutsim.pairs.partners import CurrentPartners, PairKinematics
+from cutsim.pairs.segments import SegmentPoints
 from cutsim.pairs.surface_pass import SurfacePass, slave_points
 
 _AXES = "xyz"
@@ -34,9 +36,9 @@ Parts = NDArray[np.int32] | Face | Sequence[NDArray[np.int32] | Face]
 class SurfacePair(Term):
     """Contact, friction and cohesion between two surfaces, or of one with itself; their meshes need not match.
 
-    The traction is integrated over the slave surface.  In two passes each surface is slave once, with half of the
-    traction: a uniform pressure is then transmitted almost uniformly.  A surface that meets itself is slave and master,
-    with half of the traction at each of its points.
+    The traction is integrated over the slave surface, by parts of its facets that face one facet of the master each in
+    the reference configuration.  In two passes each surface is slave once, with half of the traction.  A surface that
+    meets itself is slave and master, with half of the traction at each of its points.
 
     Args:
         state: Displacement, of degree 1 or 2, and time.
@@ -127,12 +129,12 @@ class SurfacePair(Term):
     ) -> SurfacePass:
         """A part of one surface over all of the other one. Collective."""
         state, name = self.state, f"{self.name} pass {i + 1}"
-        points = slave_points(state, face, "slave_facets" if self.signs[i] > 0 else "master_facets")
-        surfaces, lengths = (
-            (SlaveSurface(state.V, face, points), master),
-            (search, mean_size(state.mesh, [face], facet_size)),
-        )
-        bonds = (laws.cohesive is not None, small_sliding)
+        named = "slave_facets" if self.signs[i] > 0 else "master_facets"
+        # what a surface is going to meet, once it folds, is not what is near it now
+        divided = partial(SegmentPoints, master=master, search=search, sliding=not small_sliding)
+        points = (slave_points if self.folding else divided)(state, face, named)
+        surfaces = SlaveSurface(state.V, face, points), master
+        lengths, bonds = (search, mean_size(state.mesh, [face], facet_size)), (laws.cohesive is not None, small_sliding)
         kinematics = _partners(state.memory, name, surfaces, lengths, bonds, folding=self.folding)
         weight = 0.5 if self.folding or -1 in self.signs else 1.0
         return SurfacePass(state, name, points, kinematics, laws, weight=weight)

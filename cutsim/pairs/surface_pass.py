@@ -152,7 +152,7 @@ class SurfacePass:
         pairs = self._pairs_at(((1 - s) * slave + s * slave_end, (1 - s) * master + s * master_end))
         self._law.set_pairs(pairs)
         values, touching = self._law.values(), pairs[0]
-        change = touching.increment(self.kinematics.interpolate(slave_end - slave), master_end - master)
+        change = touching.increment(self.kinematics.slave.at_points(slave_end - slave), master_end - master)
         power = np.einsum("nai,ni->na", touching.slave.frames, change)
         return values | {
             "contact_power": -values["pressure"] * self._shaped(power[:, 0]),
