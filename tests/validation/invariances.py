@@ -132,7 +132,7 @@ def resumed(quick: bool) -> dict[str, float]:
     return {"difference": difference(plain, np.array(rest))}
 
 
-PROBLEMS = {"units": units, "turned": turned, "ranks": ranks, "resumed": resumed}
+PROBLEMS = {"units": units, "turned": turned, "partition": ranks, "resumed": resumed}
 
 if __name__ == "__main__":
     if "--save" in sys.argv:  # one of the ranks
