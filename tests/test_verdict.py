@@ -150,7 +150,8 @@ def test_the_summary_has_the_verdict(tmp_path, capsys):
     recording.summary({"force": 2.5})
     comm.barrier()
     found, line = summary(folder), f"pull: {mechanics.state.verdict}\n"
-    assert found == {**mechanics.state.verdict.record(), "time": 1.0, "until": 1.0, "force": 2.5}
+    size = {"unknowns": mechanics.state.unknowns, "time": 1.0, "until": 1.0}
+    assert found == {**mechanics.state.verdict.record(), **size, "force": 2.5}
     assert found["verdict"] == "questionable" and len(found["reasons"]) == 1
     assert (line in capsys.readouterr().out) == (comm.rank == 0)
 

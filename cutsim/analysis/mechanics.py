@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain, count
 from typing import Any, Literal
 
@@ -183,24 +183,7 @@ class Mechanics(Balance[Term, Support]):
         Args:
             line_search: "l2", "bt" or "basic"; the solver's default if None.
         """
-        return self._settle(lambda: super(Mechanics, self).solve(line_search))
-
-    def _settle(self, solve: Callable[[], Outcome]) -> Outcome:
-        """Outcome of a solve and of those after augmentations, to which no term objects. Collective."""
-        outcome = solve()
-        for _ in range(AUGMENTATIONS):
-            # every term takes part: a list, because any() would stop at the first
-            if not outcome.converged or not any([t.augment() for t in offering(self.terms, Augmenting)]):
-                break
-            outcome = solve().after(outcome)
-        else:
-            message = f"contact not settled by {AUGMENTATIONS} augmentations"
-            outcome = replace(outcome, converged=False, message=message)
-        if outcome.converged:
-            objections = [why for t in offering(self.terms, Objecting) if (why := t.objection())]
-            if objections:
-                outcome = replace(outcome, converged=False, message="; ".join(objections))
-        return outcome
+        return _settled(self.terms, lambda: super(Mechanics, self).solve(line_search))
 
     def evaluate(self) -> None:
         """Trial history, energies and reactions of the converged trial state. Collective."""
@@ -223,7 +206,7 @@ class Mechanics(Balance[Term, Support]):
     @cached_property
     def path(self) -> EquilibriumPath:
         """The path of its equilibria. Making it is collective."""
-        return EquilibriumPath(self, self._settle, self._lost)
+        return EquilibriumPath(self, partial(_settled, self.terms), self._lost)
 
     def _lost(self) -> float:
         return self.trial_audit.entries["fracture"] - self.audit.entries["fracture"]
@@ -272,6 +255,24 @@ class Mechanics(Balance[Term, Support]):
         for observer in self._observers:
             columns |= observer.record()
         return columns | self.trial_audit.record()
+
+
+def _settled(terms: Sequence[Term], solve: Callable[[], Outcome]) -> Outcome:
+    """Outcome of a solve and of those after augmentations, to which no term objects. Collective."""
+    outcome = solve()
+    for _ in range(AUGMENTATIONS):
+        # every term takes part: a list, because any() would stop at the first
+        if not outcome.converged or not any([t.augment() for t in offering(terms, Augmenting)]):
+            break
+        outcome = solve().after(outcome)
+    else:
+        message = f"contact not settled by {AUGMENTATIONS} augmentations"
+        outcome = replace(outcome, converged=False, message=message)
+    if outcome.converged:
+        objections = [why for t in offering(terms, Objecting) if (why := t.objection())]
+        if objections:
+            outcome = replace(outcome, converged=False, message="; ".join(objections))
+    return outcome
 
 
 def _check_places(state: State, terms: Sequence[Term]) -> None:

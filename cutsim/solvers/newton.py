@@ -188,11 +188,7 @@ class NonlinearProblem:
         return self._system.forces.vector()
 
     def reactions(self) -> PETSc.Vec:
-        """Forces of the supports on the body at the present u: `residual` along what is prescribed, else zero.
-
-        Returns:
-            A new vector of the owned dofs; the caller owns it.
-        """
+        """Forces of the supports on the body: `residual` along what is prescribed, else zero; the caller owns it."""
         b = self.residual()
         b.array[:] = self.supported(b.array_r)
         return b

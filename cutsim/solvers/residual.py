@@ -46,7 +46,6 @@ class Residual:
         self._directions = directions
         V = u.function_space
         layout = V.dofmap.index_map, V.dofmap.index_map_bs
-        self._comm: MPI.Comm = V.mesh.comm
         self.n = layout[0].size_local * layout[1]
         self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
         self._added = owned_vector(*layout)
@@ -79,7 +78,7 @@ class Residual:
     def violated(self, tolerance: float) -> bool:
         """Whether a prescribed value is missed by more than a tolerance [length]."""
         worst = float(np.abs(self._present_violation()).max(initial=0.0))
-        return bool(self._comm.allreduce(worst, MPI.MAX) > tolerance)
+        return bool(self._u.function_space.mesh.comm.allreduce(worst, MPI.MAX) > tolerance)
 
     def assemble(self, *, lift: bool) -> Array:
         """Owned forces at the present u, along the axes of the nodes.
