@@ -21,7 +21,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from ufl.algorithms import expand_derivatives
-from ufl.algorithms.transformer import strip_variables
+from ufl.corealg.map_dag import map_expr_dag
+from ufl.corealg.multifunction import MultiFunction
 
 from cutsim.base.jit import JIT_OPTIONS, jit_cache
 
@@ -135,6 +136,15 @@ def sparsity_pattern(forms: Sequence[fem.Form]) -> SparsityPattern:
     return pattern
 
 
+class _WithoutVariables(MultiFunction):
+    """What the variables stand for, in their place; each part of an expression is visited once."""
+
+    expr = MultiFunction.reuse_if_untouched
+
+    def variable(self, _: Any, expression: Any, __: Any) -> Any:
+        return expression
+
+
 def expression(expression: Any, points: NDArray[np.float64], mesh: Mesh) -> fem.Expression:
     """Compile a UFL expression with the project's compiler options. Collective.
 
@@ -147,7 +157,7 @@ def expression(expression: Any, points: NDArray[np.float64], mesh: Mesh) -> fem.
         The compiled expression.
     """
     # its signature counts the variables of the whole process: without them equal expressions are compiled once
-    plain = strip_variables(expand_derivatives(expression))
+    plain = map_expr_dag(_WithoutVariables(), expand_derivatives(expression))
     with jit_cache(mesh.comm):
         return fem.Expression(plain, points, jit_options=JIT_OPTIONS)
 
