@@ -113,7 +113,7 @@ GEL, GEL_BOND = NeoHookean(0.02, 0.45), Exponential(strength=0.03, toughness=0.0
 STRIP, STRIP_BOND = NeoHookean(0.777, 0.45), Exponential(strength=0.3, toughness=0.1)
 SILICONE = Block("silicone", STRIP, STRIP_BOND, blade(20, 0.1, 0.4), 1e-3, 1.6, 0.3, 0.4, 1.2, 1.4)
 SHARP = replace(SILICONE, name="silicone, sharp", blade=blade(20, 0.05, 0.4))
-RUBBED = replace(SILICONE, name="silicone, friction 0.3", steady=0.2, friction=0.3)
+RUBBED = replace(SILICONE, name="silicone, friction 0.3", friction=0.3)
 BLOCKS = (
     Block("gel", GEL, GEL_BOND, blade(15, 0.3, 0.75), 5e-4, 6.5, 0.6, 0.8, 5.0, 3.0),
     SILICONE,
