@@ -26,6 +26,8 @@ _ITERATIONS, _ACCURACY, _OUTSIDE = 20, 1e-14, 1.0
 _MOST = 64
 # distance of an edge from another one, over the size of the facet, up to which both are the same
 _SAME = 1e-10
+# digits of a place over the size of the facet by which master facets are sorted
+_DIGITS = 8
 # kind of a part by its number of corners, and these in the order of the reference cell from side by side
 _KINDS = {2: basix.CellType.interval, 3: basix.CellType.triangle, 4: basix.CellType.quadrilateral}
 _ORDER = {2: [0, 1], 3: [0, 1, 2], 4: [0, 1, 3, 2]}
@@ -168,7 +170,11 @@ def _corners(slave: OuterSurface, flat: _Flat, master: SharedSurface, search: fl
     xi, step = _closest(shape, nodes[owner], master.reference[m][:, :count].reshape(len(owner), nodes.shape[2]))
     # corners far outside of a facet are where its plane has them: there the map of a warped facet may be singular
     places = flat.places(owner, xi) + np.einsum("nk,nki->ni", step, flat.tangents(owner, xi))
-    return s, places.reshape(len(s), count, places.shape[1])
+    places = places.reshape(len(s), count, places.shape[1])
+    # one after the other by where they are, so that a facet is divided alike on any number of ranks
+    middle = places.mean(axis=1) / np.abs(flat.corners[s]).max(axis=(1, 2), initial=0.0)[:, None]
+    order = np.lexsort((*np.round(middle, _DIGITS).T, s))
+    return s[order], places[order]
 
 
 def _outward(surface: OuterSurface | SharedSurface) -> Array:
