@@ -42,8 +42,8 @@ test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those 
 	scripts/run -n 1 -m pytest -n $(JOBS) --dist loadfile tests $(ARGS)
 	@$(MAKE) --no-print-directory test-mpi
 
-test-mpi: $(STAMP) ## run the tests marked mpi on 2 ranks, and on 3 with two sets of parameters each
-	scripts/run -n 2 -m pytest -x -q -p no:cacheprovider -m mpi tests $(ARGS)
+test-mpi: $(STAMP) ## run the tests marked mpi on 2 and 3 ranks, with two sets of parameters each
+	scripts/run -n 2 -m pytest -x -q -p no:cacheprovider -m mpi --thin tests $(ARGS)
 	scripts/run -n 3 -m pytest -x -q -p no:cacheprovider -m mpi --thin tests $(ARGS)
 
 campaign: $(STAMP) ## run random cuts, or go on with them: SEED=2 ARGS="--plane 50 --space 0"; writes results/campaign
