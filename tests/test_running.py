@@ -75,7 +75,7 @@ def test_an_older_run_is_kept_unless_it_is_to_be_replaced(folder):
 
 
 def test_without_equilibrium_all_steps_are_kept(folder):
-    impossible = {"solver.petsc": "{ snes_max_it = 1 }", "steps.smallest": "0.02"}
+    impossible = {"solver.petsc": "{ snes_max_it = 0 }", "steps.smallest": "0.02"}
     outcome = run_case(short(impossible), folder, COMM, quiet=True)
     assert ending_of_run(outcome) == 3 and "no step from time" in str(outcome.error)
     assert json.loads((folder / "summary.json").read_text())["verdict"] == "questionable"
