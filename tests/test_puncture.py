@@ -65,7 +65,7 @@ def pushed(depth, fixture=None, sizes=None, **drive):
         deep = max(contact.penetration() * contact.patches[0].normal_size for contact in cut.contacts)
         rows.append(report.columns | cut.columns(report.columns) | {"deepest": (deep, "length")})
 
-    run(cut.mechanics, cut.time_of(depth), StepControl(first=0.02, largest=0.1, smallest=1e-5, closure=5e-3), record)
+    run(cut.mechanics, cut.time_of(depth), StepControl(first=0.02, largest=0.1, smallest=1e-5, closure=2e-3), record)
     return cut, {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
 
 
