@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Protocol
 
+from cutsim.analysis.brake import Brake
 from cutsim.base.checks import nonnegative, positive, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
@@ -51,21 +52,6 @@ class Path(Protocol):
         Args:
             size: What it loses [energy].
             span: Largest change of time in an iteration [time].
-        """
-
-
-class Brake(Protocol):
-    """Protocol of a drag on a body, which carries a run across a jump."""
-
-    @property
-    def stiffness(self) -> float:
-        """Mean stiffness of a node, beside which a drag is weak or strong [force/length]. Collective."""
-
-    def hold(self, drag: float) -> None:
-        """Let the drag act in the trial step, which has begun.
-
-        Args:
-            drag: Force on a node over its velocity [force·time/length].
         """
 
 

@@ -42,7 +42,7 @@ def main() -> None:
     if comm.rank == 0:
         print("   dofs  ranks  set-up [s]  wall [s]  steps  cuts  Newton  Krylov  memory [GB]  closure  force [N/mm]")
         print(
-            f"{2 * cut.state.V.dofmap.index_map.size_global:7d} {comm.size:6d} {build.wall:11.2f} {usage.wall:9.2f}"
+            f"{cut.state.unknowns:7d} {comm.size:6d} {build.wall:11.2f} {usage.wall:9.2f}"
             f" {len(reports):6d} {sum(r.cuts for r in reports):5d} {sum(r.outcome.iterations for r in reports):7d}"
             f" {sum(r.outcome.linear_iterations for r in reports):7d} {usage.memory:12.2f}"
             f" {cut.mechanics.audit.closure:8.1e} {force:13.4f}"

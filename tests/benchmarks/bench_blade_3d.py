@@ -58,7 +58,7 @@ def main() -> None:
         if comm.rank == 0:
             builds = cut.mechanics.problem.preconditioner.builds
             print(
-                f"{name:>6s} {3 * cut.state.V.dofmap.index_map.size_global:7d} {comm.size:6d} {build.wall:11.2f}"
+                f"{name:>6s} {cut.state.unknowns:7d} {comm.size:6d} {build.wall:11.2f}"
                 f" {usage.wall:9.2f} {usage.cpu:8.2f} {len(reports):6d} {sum(r.cuts for r in reports):5d} {newton:7d}"
                 f" {krylov:7d} {builds:7d} {usage.cpu / newton:15.3f} {newton / len(reports):12.2f}"
                 f" {usage.memory:12.2f} {cut.mechanics.audit.closure:8.1e} {force:10.5f}\n{usage}\n"

@@ -69,7 +69,7 @@ def main() -> None:
         columns = {name: value for name, (value, _) in reports[-1].columns.items()}
         print("   dofs  ranks  wall [s]  steps  cuts  Newton  Krylov  memory [GB]  closure  forces [N]")
         print(
-            f"{3 * state.V.dofmap.index_map.size_global:7d} {COMM.size:6d} {usage.wall:9.2f} {len(reports):6d}"
+            f"{state.unknowns:7d} {COMM.size:6d} {usage.wall:9.2f} {len(reports):6d}"
             f" {sum(r.cuts for r in reports):5d} {sum(r.outcome.iterations for r in reports):7d}"
             f" {sum(r.outcome.linear_iterations for r in reports):7d} {usage.memory:12.2f}"
             f" {columns['energy_closure']:8.1e} {columns['top_x_force']:7.4f} {-columns['top_z_force']:7.4f}"

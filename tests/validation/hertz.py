@@ -211,7 +211,7 @@ class Indentation:
         ratio = force / self.specimen.force(depth, elastic=self.elastic)
         off = radius / self.specimen.contact_radius(depth) - 1
         return {
-            "unknowns": 3 * self.mechanics.state.V.dofmap.index_map.size_global,
+            "unknowns": self.mechanics.state.unknowns,
             "force_off": float(np.abs(ratio - 1).max()),
             "force_over_hertz_first": float(ratio[0]),
             "force_over_hertz_last": float(ratio[-1]),
