@@ -1,5 +1,7 @@
 """The nonlinear solver and its preconditioners against linear algebra, closed forms and bounds on iterations."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import ufl
@@ -9,7 +11,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from cutsim.base import compat
-from cutsim.base.jit import jit_cache
+from cutsim.base.jit import compiled
 from cutsim.fields.space import cracked_space
 from cutsim.solvers import preconditioners, strips
 from cutsim.solvers.convergence import Criteria, Tolerances
@@ -567,15 +569,41 @@ def test_a_stale_preconditioner_is_rebuilt(contrast):
 def test_a_source_left_half_built_is_removed(tmp_path):
     for name in ("whole.c", "whole.c.cached", "half.c", "half.o"):
         (tmp_path / name).touch()
-    with jit_cache(MPI.COMM_SELF, tmp_path):
-        assert {p.name for p in tmp_path.glob("*.c*")} == {"whole.c", "whole.c.cached"}
+    compiled(MPI.COMM_SELF, lambda: None, tmp_path)
+    assert {p.name for p in tmp_path.glob("*.c*")} == {"whole.c", "whole.c.cached"}
+    assert not list((tmp_path / "compiling").iterdir())
+
+
+def test_a_source_is_kept_while_somebody_could_be_compiling_it(tmp_path):
+    def somebody():
+        (tmp_path / "theirs.c").touch()
+        compiled(MPI.COMM_SELF, lambda: None, tmp_path)
+        assert (tmp_path / "theirs.c").exists()
+
+    compiled(MPI.COMM_SELF, somebody, tmp_path)
+    compiled(MPI.COMM_SELF, lambda: None, tmp_path)
+    assert not (tmp_path / "theirs.c").exists()
+
+
+@pytest.mark.mpi
+def test_a_wait_for_a_process_that_was_killed_is_repeated(tmp_path):
+    folder = Path(WORLD.bcast(str(tmp_path)))
+    tries = []
+
+    def waits():
+        tries.append((folder / "half.c").exists())
+        if WORLD.rank == 0 and len(tries) == 1:
+            (folder / "half.c").touch()
+        if len(tries) == 1:  # the words of rank 0 and those of the others
+            raise RuntimeError("JIT compilation timed out" if WORLD.rank == 0 else "JIT compilation failed on rank 0.")
+        return "kernel"
+
+    assert compiled(WORLD, waits, folder) == "kernel"
+    assert len(tries) == 2 and not tries[1]
 
 
 @pytest.mark.mpi
 def test_a_cache_that_cannot_be_written_is_named_on_all_ranks(tmp_path):
     (tmp_path / "file").touch()
-    with (
-        pytest.raises(RuntimeError, match=r"cannot be kept in .*: set XDG_CACHE_HOME"),
-        jit_cache(WORLD, tmp_path / "file" / "cache"),
-    ):
-        raise AssertionError("nothing is compiled")
+    with pytest.raises(RuntimeError, match=r"cannot be kept in .*: set XDG_CACHE_HOME"):
+        compiled(WORLD, lambda: pytest.fail("nothing is compiled"), tmp_path / "file" / "cache")

@@ -24,7 +24,7 @@ from ufl.algorithms import expand_derivatives
 from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
-from cutsim.base.jit import JIT_OPTIONS, jit_cache
+from cutsim.base.jit import JIT_OPTIONS, compiled
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 _BEFORE_0_10 = _VERSION < (0, 10)
@@ -95,13 +95,16 @@ def form(
     """
     options = {**JIT_OPTIONS, **(jit_options or {})}
     maps = dict(entity_maps or {})
-    with jit_cache(form.ufl_domain().ufl_cargo().comm, Path(options["cache_dir"])):
-        return fem.form(
+    return compiled(
+        form.ufl_domain().ufl_cargo().comm,
+        lambda: fem.form(
             form,
             entity_maps=maps if _BEFORE_0_10 else list(maps.values()),
             jit_options=options,
             form_compiler_options=dict(form_compiler_options or {}),
-        )
+        ),
+        Path(options["cache_dir"]),
+    )
 
 
 def forms(whole: ufl.Form, *, entity_maps: EntityMaps | None = None) -> list[fem.Form]:
@@ -158,8 +161,7 @@ def expression(expression: Any, points: NDArray[np.float64], mesh: Mesh) -> fem.
     """
     # its signature counts the variables of the whole process: without them equal expressions are compiled once
     plain = map_expr_dag(_WithoutVariables(), expand_derivatives(expression))
-    with jit_cache(mesh.comm):
-        return fem.Expression(plain, points, jit_options=JIT_OPTIONS)
+    return compiled(mesh.comm, lambda: fem.Expression(plain, points, jit_options=JIT_OPTIONS))
 
 
 def nodal_expression(expression_: Any, V: fem.FunctionSpace) -> fem.Expression:

@@ -4,10 +4,12 @@ import fcntl
 import hashlib
 import os
 import platform
-from collections.abc import Iterator
-from contextlib import contextmanager
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, TypeVar
 
 from mpi4py import MPI
 
@@ -30,56 +32,98 @@ CACHE_DIR = Path(os.getenv("XDG_CACHE_HOME", Path.home() / ".cache")) / "cutsim"
 JIT_OPTIONS: dict[str, Any] = {
     "cffi_extra_compile_args": ["-O3", "-g0", "-march=native", "-ffast-math", "-fno-finite-math-only"],
     "cache_dir": str(CACHE_DIR),
-    "timeout": 600,
+    "timeout": 20,
 }
 
+# how long another process may take for a form that is needed here too [s]
+_PATIENCE = 600.0
 
-# state of each cache directory (its time of change) in which nothing was found abandoned
-_clean: dict[Path, int] = {}
+T = TypeVar("T")
+
+
+def compiled(comm: MPI.Comm, compile_: Callable[[], T], directory: Path = CACHE_DIR) -> T:
+    """Compile in the cache of kernels, having removed what a killed process left half built. Collective.
+
+    A source file without its `.c.cached` mark makes the next compilation of the same form wait for a process
+    that may be gone. Whoever compiles keeps a file of its own locked meanwhile: a source that is older than all of
+    these is nobody's. As long as it could be somebody's, the wait is repeated.
+
+    Args:
+        comm: Communicator of the compilation; only its rank 0 compiles.
+        compile_: Calls dolfinx' compiler, with `JIT_OPTIONS`.
+        directory: The cache.
+
+    Returns:
+        What `compile_` returns.
+
+    Raises:
+        RuntimeError: On all ranks, if the cache cannot be written or the compilation fails.
+    """
+    began = time.monotonic()
+    while True:
+        try:
+            with _compiling(comm, directory):
+                return compile_()
+        except (RuntimeError, TimeoutError) as error:
+            again = "compilation timed out" in str(error) and time.monotonic() - began < _PATIENCE
+            if not comm.bcast(again):  # rank 0 is the one that has waited and knows why
+                raise
 
 
 @contextmanager
-def jit_cache(comm: MPI.Comm, directory: Path = CACHE_DIR) -> Iterator[None]:
-    """Share the kernel cache while compiling, having removed what a killed process left half built.
-
-    A source file without its `.c.cached` mark makes the next compilation of the same form wait for a process
-    that is gone. While nobody else is compiling, which the lock tells, such a file is known to be abandoned.
-
-    Args:
-        comm: Communicator of the compilation; only its rank 0 compiles, so only that rank takes the lock.
-        directory: The cache.
-
-    Raises:
-        RuntimeError: On all ranks, if the cache cannot be written.
-    """
-    lock, problem = None, None
+def _compiling(comm: MPI.Comm, directory: Path) -> Iterator[None]:
+    """Remove what nobody compiles any more, and tell other processes that this one compiles."""
+    mine, problem = None, None
     if comm.rank == 0:
+        marks = directory / "compiling"
         try:
-            directory.mkdir(parents=True, exist_ok=True)
-            lock = open(directory / "lock", "w")  # unlocked when the file is closed, also when the process dies
+            marks.mkdir(parents=True, exist_ok=True)
+            _remove_abandoned(directory, marks)
+            mine = _mark(marks)
         except OSError as error:
             problem = str(error)
     if (problem := comm.bcast(problem)) is not None:
         raise RuntimeError(
             f"compiled forms cannot be kept in {directory} ({problem}): set XDG_CACHE_HOME to another folder"
         )
-    if lock is None:
+    if mine is None:
         yield
         return
-    with lock:
-        if _clean.get(directory) != directory.stat().st_mtime_ns:
-            _remove_abandoned(directory, lock)
-        fcntl.flock(lock, fcntl.LOCK_SH)
+    with mine:  # the file is unlocked when it is closed, also when the process dies
         yield
 
 
-def _remove_abandoned(directory: Path, lock: TextIO) -> None:
-    """Remove half-built kernels unless somebody is compiling."""
-    try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return
-    for source in directory.glob("*.c"):
-        if not source.with_suffix(".c.cached").exists():
-            source.unlink(missing_ok=True)
-    _clean[directory] = directory.stat().st_mtime_ns
+def _mark(marks: Path) -> Any:
+    """A new file, locked, that vanishes when it is closed."""
+    while True:
+        mark = tempfile.NamedTemporaryFile(dir=marks)
+        fcntl.flock(mark, fcntl.LOCK_EX)
+        if Path(mark.name).exists():
+            return mark
+        with suppress(FileNotFoundError):  # another process took it for one left behind, before it was locked
+            mark.close()
+
+
+def _oldest(marks: Path) -> float:
+    """Time at which the first of those that compile now has begun [s]; infinite if there is none."""
+    times = [float("inf")]
+    for path in marks.iterdir():
+        with suppress(FileNotFoundError), open(path) as mark:
+            try:
+                fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                path.unlink()
+            except BlockingIOError:
+                times.append(path.stat().st_mtime)
+    return min(times)
+
+
+def _remove_abandoned(directory: Path, marks: Path) -> None:
+    """Remove the half-built kernels that nobody can be compiling."""
+    # the names are read before the marks: whoever began one of these sources is marked by now, or has ended
+    names = set(os.listdir(directory))
+    half = [directory / name for name in names if name.endswith(".c") and f"{name}.cached" not in names]
+    oldest = _oldest(marks) if half else 0.0
+    for source in half:
+        with suppress(FileNotFoundError):
+            if source.stat().st_mtime < oldest and not source.with_suffix(".c.cached").exists():
+                source.unlink()
