@@ -11,7 +11,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from cutsim.base import compat
+from cutsim.base.assembly import integrate
 from cutsim.base.jit import compiled
+from cutsim.fields.measures import Measures
 from cutsim.fields.space import cracked_space
 from cutsim.solvers import preconditioners, strips
 from cutsim.solvers.convergence import Criteria, Tolerances
@@ -600,6 +602,19 @@ def test_a_wait_for_a_process_that_was_killed_is_repeated(tmp_path):
 
     assert compiled(WORLD, waits, folder) == "kernel"
     assert len(tries) == 2 and not tries[1]
+
+
+def test_forms_that_differ_in_the_markers_of_their_domains_are_compiled_once():
+    quads = square(MPI.COMM_SELF, 4)
+    measures = Measures(quads)
+    four = np.arange(4, dtype=np.int32)
+    everywhere, part = measures.cells(), measures.cells(four)
+    x = ufl.SpatialCoordinate(quads)[0]
+    kernels = compat.form(x * everywhere), compat.form(x * part)
+    assert kernels[0].module.__name__ == kernels[1].module.__name__
+    expected = mesh.compute_midpoints(quads, 2, four)[:, 0].sum() / 16
+    assert [integrate(kernel) for kernel in kernels] == pytest.approx([0.5, expected])
+    assert integrate(compat.form(x * part + 2 * x * everywhere)) == pytest.approx(1 + expected)
 
 
 @pytest.mark.mpi

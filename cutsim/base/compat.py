@@ -95,15 +95,37 @@ def form(
     """
     options = {**JIT_OPTIONS, **(jit_options or {})}
     maps = dict(entity_maps or {})
+    counted = _counted(form)
     return compiled(
         form.ufl_domain().ufl_cargo().comm,
         lambda: fem.form(
-            form,
+            counted,
             entity_maps=maps if _BEFORE_0_10 else list(maps.values()),
             jit_options=options,
             form_compiler_options=dict(form_compiler_options or {}),
         ),
         Path(options["cache_dir"]),
+    )
+
+
+def _counted(form: ufl.Form) -> ufl.Form:
+    """The form with the markers of its domains counted from 0: forms that differ only in them are compiled once."""
+    domains: dict[str, dict[int, Any]] = {}
+    for integral in form.integrals():
+        if not isinstance(integral.subdomain_id(), int) or not isinstance(integral.subdomain_data(), list):
+            return form
+        entities = dict(integral.subdomain_data())[integral.subdomain_id()]
+        domains.setdefault(integral.integral_type(), {})[integral.subdomain_id()] = entities
+    order = {kind: sorted(marked) for kind, marked in domains.items()}
+    data = {kind: [(new, marked[old]) for new, old in enumerate(order[kind])] for kind, marked in domains.items()}
+    return ufl.Form(
+        [
+            integral.reconstruct(
+                subdomain_id=order[integral.integral_type()].index(integral.subdomain_id()),
+                subdomain_data=data[integral.integral_type()],
+            )
+            for integral in form.integrals()
+        ]
     )
 
 
