@@ -1,11 +1,12 @@
 """What tables of a case file, each valid by itself, have to have in common."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from cutsim.cases.geometries import LAMINATE
 from cutsim.cases.keys import Keys
-from cutsim.cases.schema_parts import Pair, Tool, Weight
+from cutsim.cases.schema_parts import Carriage, Moved, Pair, Tool, Weight
+from cutsim.cases.schema_rigs import AnyMachine
 
 _ABSOLUTE_ZERO = {"K": 0.0, "degC": -273.15}
 # vectors of the motions of tools
@@ -20,7 +21,7 @@ def contradictions(valid: Mapping[str, Any]) -> Iterator[Problem]:
     Args:
         valid: Those tables that are valid by themselves; what concerns others is not looked at.
     """
-    for check in (_dimension, _materials, _laws, _layers, _insertion, _end, _pairs, _tools, _dynamics, _heat):
+    for check in _CHECKS:
         try:
             yield from check(valid)
         except KeyError:  # it concerns a table that is not valid
@@ -34,28 +35,31 @@ def _dimension(valid: Mapping[str, Any]) -> Iterator[Problem]:
     if gdim is None:
         yield ("mesh", "dim"), "missing, must be given: 2 or 3, the dimension of the mesh and of its space", None
         return
+    flat = {"z", "rx", "ry"} if gdim == 2 else set()
+    for name, link in valid.get("links", {}).items():
+        for axis in sorted(flat & link.motion.keys()):
+            yield ("links", name, axis), "not allowed: the mesh is flat", getattr(link, axis)
     for keys, vector in _vectors(valid):
         if isinstance(vector, tuple) and len(vector) != gdim:
             yield keys, f"must have {gdim} components, as the mesh has dimensions", list(vector)
-        if gdim == 2 and vector in ("z", "-z"):
+        if vector in flat or (flat and vector == "-z"):
             yield keys, "must be another axis: the mesh is flat", vector
 
 
 def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
     """Positions and directions of a case."""
     for name, tool in valid.get("tools", {}).items():
-        key, path = ("tools", name), tool.path
-        yield (*key, "position"), tool.position
-        yield from (((*key, "path", "points", i), p) for i, p in enumerate(getattr(path, "points", ())))
-        yield from (((*key, "path", part), getattr(path, part, None)) for part in _MOTIONS)
-        yield from (((*key, "machines", i, "axis"), machine.axis) for i, machine in enumerate(tool.machines))
+        yield from _moving(("tools", name), tool)
         for part in getattr(type(tool.made), "directions", ()):
-            yield (*key, part), getattr(tool, part)
+            yield ("tools", name, part), getattr(tool, part)
+    for name, carriage in valid.get("carriages", {}).items():
+        yield from _moving(("carriages", name), carriage)
     insertion = valid.get("insertion")
     if insertion is not None and insertion.machine is not None:
         yield ("insertion", "machine", "axis"), insertion.machine.axis
     for name, link in valid.get("links", {}).items():
         yield ("links", name, "reference"), link.reference
+        yield from _axes(("links", name), link.machines)
         for part, place in link.attachments.items():
             where = ("links", name, "attachments", part, "points")
             yield from (((*where, i), point) for i, point in enumerate(place.points))
@@ -65,6 +69,18 @@ def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
             yield from (((table, name, "points", i), p) for i, p in enumerate(getattr(entry, "points", ())))
     for name, crack in valid.get("cracks", {}).items():
         yield ("cracks", name, "plus"), None if isinstance(crack.plus, str) else crack.plus
+
+
+def _moving(key: Keys, table: Tool | Carriage) -> Iterator[tuple[Keys, Any]]:
+    """Positions and directions of a tool or a carriage."""
+    yield (*key, "position"), table.position
+    yield from (((*key, "path", "points", i), p) for i, p in enumerate(getattr(table.path, "points", ())))
+    yield from (((*key, "path", part), getattr(table.path, part, None)) for part in _MOTIONS)
+    yield from _axes(key, table.machines)
+
+
+def _axes(key: Keys, machines: Sequence[AnyMachine]) -> Iterator[tuple[Keys, Any]]:
+    yield from (((*key, "machines", i, "axis"), machine.axis) for i, machine in enumerate(machines))
 
 
 def _materials(valid: Mapping[str, Any]) -> Iterator[Problem]:
@@ -118,9 +134,12 @@ def _insertion(valid: Mapping[str, Any]) -> Iterator[Problem]:
     insertion = valid["insertion"]
     if insertion is None:
         return
-    for table in ("cracks", "pairs", "supports", "links", "loads"):
+    for table in ("cracks", "pairs", "carriages", "supports", "links", "loads"):
         if valid[table]:
             yield (table,), "not allowed beside [insertion], which makes its own", None
+    for name in valid["tools"]:
+        if name != insertion.tool:
+            yield ("tools", name), f"not allowed beside [insertion], whose tool is {insertion.tool!r}", None
     tool = valid["tools"].get(insertion.tool)
     if tool is None:
         yield ("insertion", "tool"), "must be the name of a tool, such as that of [tool]", insertion.tool
@@ -160,17 +179,33 @@ def _tools(valid: Mapping[str, Any]) -> Iterator[Problem]:
     inserted = None if valid["insertion"] is None else valid["insertion"].tool
     tools: Mapping[str, Tool] = valid["tools"]
     for name, tool in tools.items():
-        moved = (tool.position is not None) + (tool.path is not None)
         if name == inserted:
+            moved = tool.position is not None or tool.path is not None
             if moved or tool.rotation is not None or tool.surfaces:
                 yield ("tools", name), "must have no surfaces and no motion: [insertion] gives them", None
-            if tool.machines:
-                yield ("tools", name, "machines"), "not allowed: give [insertion] a machine, which moves the tool", None
+            for key in ("machines", "carriage"):
+                if getattr(tool, key):
+                    yield ("tools", name, key), "not allowed: give [insertion] a machine, which moves the tool", None
             continue
         if not tool.surfaces:
             yield ("tools", name, "surfaces"), "missing, must be given: what the tool can touch", None
-        if moved != 1:
-            yield ("tools", name, "position"), "must be given, or path, and not both", None
+        yield from _motion(("tools", name), tool)
+        if tool.machines and tool.carriage is not None:
+            yield ("tools", name, "machines"), "not allowed beside carriage, which has machines of its own", None
+
+
+def _motion(key: Keys, table: Moved) -> Iterator[Problem]:
+    """Whether a motion is given, and one only."""
+    if (table.position is None) == (table.path is None):
+        yield (*key, "position"), "must be given, or path, and not both", None
+
+
+def _carriages(valid: Mapping[str, Any]) -> Iterator[Problem]:
+    carried = {tool.carriage for tool in valid["tools"].values()}
+    for name, carriage in valid["carriages"].items():
+        yield from _motion(("carriages", name), carriage)
+        if name not in carried:
+            yield ("carriages", name), f"carries nothing: give a tool carriage = {name!r}", None
 
 
 def _dynamics(valid: Mapping[str, Any]) -> Iterator[Problem]:
@@ -197,3 +232,18 @@ def _heat(valid: Mapping[str, Any]) -> Iterator[Problem]:
             yield ("heat", "bodies", name), "missing, must be given: conductivity and capacity of this body", None
         if heat is None and name in bodies and bodies[name].thermoelastic is not None:
             yield ("bodies", name, "thermoelastic"), "needs [heat], which gives the temperature", None
+
+
+_CHECKS = (
+    _dimension,
+    _materials,
+    _laws,
+    _layers,
+    _insertion,
+    _end,
+    _pairs,
+    _tools,
+    _carriages,
+    _dynamics,
+    _heat,
+)

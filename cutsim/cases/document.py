@@ -115,7 +115,7 @@ class Document:
 
     def origin(self, keys: Keys) -> tuple[str, str]:
         """File and line of a key, and the key as it was written there; or of the table that should have it."""
-        known = keys
+        known = keys = self._as_given(keys)
         while known and known not in self.origins:
             known = known[:-1]
         if not self.origins:
@@ -123,6 +123,23 @@ class Document:
         source, written = self.origins[known]
         written += keys[len(known) :]
         return source.place(written), dotted(written)
+
+    def at(self, keys: Keys) -> Any:
+        """What stands at a key; None if nothing does."""
+        node: Any = self.tables
+        for key in self._as_given(keys):
+            node = _entry(node, key)
+        return node
+
+    def _as_given(self, keys: Keys) -> Keys:
+        """A key without the number of an entry where one stands without a list."""
+        node, found = self.tables, list[str | int]()
+        for key in keys:
+            if isinstance(key, int) and isinstance(node, Mapping):
+                continue
+            found.append(key)
+            node = _entry(node, key)
+        return tuple(found)
 
     def problem(self, keys: Keys, words: str, value: Any = None) -> str:
         """One line on what is wrong with a value."""
@@ -171,6 +188,11 @@ def _short(value: Any) -> str:
     else:
         text = str(value).lower() if isinstance(value, bool) else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _entry(value: Any, key: str | int) -> Any:
+    """Entry of a table or a list; None if there is none."""
+    return next((entry for name, entry in _entries(value) if name == key), None)
 
 
 def places(value: Any, keys: Keys = ()) -> Iterator[tuple[Keys, Any]]:

@@ -10,6 +10,7 @@ from dolfinx.mesh import compute_midpoints, locate_entities
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.assembly import box
 from cutsim.cases.document import Document
 from cutsim.cases.geometries import LAMINATE, outline
 from cutsim.cases.keys import Keys, nearest
@@ -19,7 +20,8 @@ from cutsim.cases.schema_mesh import ALONG, RULE, SIZES, Selection
 from cutsim.fields.laminate import laminate
 from cutsim.fields.meshing import TaggedMesh, geometry, read_geo, read_mesh
 from cutsim.fields.refinement import Refinement
-from cutsim.fields.space import cracked_space
+from cutsim.fields.sizes import incidence
+from cutsim.fields.space import cracked_space, marks
 from cutsim.fields.state import State
 from cutsim.studies.mesh_rule import MeshRule
 
@@ -28,6 +30,8 @@ Entities = NDArray[np.int32]
 _KINDS = {0: "cells", 1: "facets"}
 # parameters of `laminate` that are whole numbers
 _COUNTS = ("least", "rows")
+# of coordinates, over the size of the mesh
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -86,19 +90,43 @@ class Domain:
     def _with(self, name: str, selection: Selection) -> TaggedMesh:
         """The mesh with one more group. Collective."""
         key, mesh = ("groups", name), self.tagged.mesh
-        dim = mesh.topology.dim - (1 if selection.facets else 0)
-        if selection.facets:
-            entities = self.facets((*key, "facets"), selection.facets)
-        else:
-            entities = self.cells((*key, "cells"), selection.cells)
+        dim, entities = self._selected(key, selection)
         middles = compute_midpoints(mesh, dim, entities) if len(entities) else np.zeros((0, 3))
+        low, high = box(mesh.comm, mesh.geometry.x)
+        slack = _ROUNDING * float(np.max(high - low))
         for axis, span in enumerate((selection.x, selection.y, selection.z)):
             if span is not None:
-                inside = (span[0] <= middles[:, axis]) & (middles[:, axis] <= span[1])
+                inside = (span[0] - slack <= middles[:, axis]) & (middles[:, axis] <= span[1] + slack)
                 entities, middles = entities[inside], middles[inside]
         if not mesh.comm.allreduce(len(entities)):
-            raise refused(self.document, key, "no facet or cell has its middle there")
-        return self.tagged.with_group(name, dim, entities)
+            raise refused(self.document, key, "no facet, cell or vertex has its middle there")
+        with refusing(self.document, "groups"):
+            return self.tagged.with_group(name, dim, entities)
+
+    def _selected(self, key: Keys, selection: Selection) -> tuple[int, Entities]:
+        """Dimension and local entities among which a group is chosen by coordinates. Collective."""
+        tdim = self.tagged.mesh.topology.dim
+        if selection.points:
+            return 0, self.nearest((*key, "points"), selection.points)
+        if selection.vertices:
+            return 0, self._vertices_of((*key, "vertices"), selection.vertices)
+        if selection.facets:
+            return tdim - 1, self.facets((*key, "facets"), selection.facets)
+        return tdim, self.cells((*key, "cells"), selection.cells)
+
+    def _vertices_of(self, key: Keys, names: Sequence[str]) -> Entities:
+        """Local vertices of some groups, of vertices, facets or cells, whichever there is. Collective."""
+        mesh, found = self.tagged.mesh, [np.empty(0, dtype=np.int32)]
+        for name in names:
+            dims = [dim for dim in range(mesh.topology.dim + 1) if (dim, name) in self.tagged.groups]
+            if not dims:
+                known = self.tagged.names
+                raise refused(self.document, key, f"{name!r} is no group of the mesh{nearest(name, known)}")
+            entities = self.tagged.groups[dims[0], name]
+            found.append(incidence(mesh, dims[0], 0)[entities].ravel() if dims[0] else entities)
+        # a rank may have a vertex, but none of the facets of a group that meet there
+        marked = marks(mesh.comm, mesh.topology.index_map(0), np.concatenate(found), "vertices")
+        return np.flatnonzero(marked).astype(np.int32)
 
     def vertices(self, key: Keys, names: Sequence[str]) -> Entities:
         """Local vertices, ghosts included, of some groups; as `cells`."""

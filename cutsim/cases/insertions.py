@@ -9,7 +9,7 @@ from cutsim.cases.domains import Domain, Entities
 from cutsim.cases.heating import temperature
 from cutsim.cases.interfaces import friction_of
 from cutsim.cases.refusals import refused, refusing
-from cutsim.cases.rigs import machines
+from cutsim.cases.rigs import machine
 from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.studies.body import CrackedBody, cracked_state
@@ -38,6 +38,7 @@ def inserted(domain: Domain, mechanics: Mapping[str, Any]) -> tuple[Insertion, T
     shape = tool.made
     if not isinstance(shape, Pointed):
         raise refused(domain.document, ("tools", table.tool, "shape"), "must be a blade or a needle, to be inserted")
+    drive = None if table.machine is None else machine(domain, (_KEY, "machine"), table.machine)
     with refusing(domain.document, _KEY):
         cut = Insertion.build(
             body,
@@ -46,7 +47,7 @@ def inserted(domain: Domain, mechanics: Mapping[str, Any]) -> tuple[Insertion, T
             notch=table.notch,
             friction=friction_of(tool, value),
             fixture=table.fixture,
-            machine=None if table.machine is None else machines([table.machine])[0],
+            machine=drive,
             mechanics=mechanics,
         )
     return cut, value

@@ -11,6 +11,7 @@ SINGULAR = {
     "crack": "cracks",
     "pair": "pairs",
     "tool": "tools",
+    "carriage": "carriages",
     "support": "supports",
     "link": "links",
     "load": "loads",

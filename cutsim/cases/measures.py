@@ -11,6 +11,7 @@ from cutsim.cases import schema_run as schema
 from cutsim.cases.domains import Domain
 from cutsim.cases.parts import Parts
 from cutsim.cases.refusals import refused, refusing
+from cutsim.fields.areas import area
 from cutsim.studies.fracture import JIntegral, crack_front
 from cutsim.tools.rigid_tool import RigidTool
 
@@ -51,8 +52,14 @@ def columns_of(domain: Domain, found: Mapping[str, Measure], row: Columns) -> Co
     return measured
 
 
-def _measure(domain: Domain, parts: Parts, name: str, table: schema.Front | schema.DomainIntegral) -> Measure:
+def _measure(
+    domain: Domain, parts: Parts, name: str, table: schema.Front | schema.Size | schema.DomainIntegral
+) -> Measure:
     key = ("measures", name)
+    if isinstance(table, schema.Size):
+        state, facets = parts.solids[0].state, domain.facets((*key, "facets"), table.facets)
+        size = area(state.mesh, facets, axisymmetric=state.axisymmetric)
+        return lambda: size, state.facet_measure
     if isinstance(table, schema.Front):
         crack = parts.cracks[table.crack]
         axis, backwards = "xyz".index(table.axis[-1]), table.axis.startswith("-")

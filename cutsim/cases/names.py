@@ -54,6 +54,7 @@ BodyNames = Annotated[tuple[BodyName, ...], _SEVERAL]
 CrackName = Annotated[str, Known("cracks")]
 PairName = Annotated[str, Known("pairs")]
 ToolName = Annotated[str, Known("tools")]
+CarriageName = Annotated[str, Known("carriages")]
 
 
 def _existing(path: Path) -> Path:

@@ -1,6 +1,6 @@
 """What is found to be wrong with a case while it is put together, said as what is wrong in its file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -38,13 +38,6 @@ def refusing(document: Document, *keys: str | int) -> Iterator[None]:
     except CaseError:
         raise
     except Refused as error:
-        raise CaseError([refusal(error, keys, _node(document, keys), document)]) from error
+        raise CaseError([refusal(error, keys, document.at(keys), document)]) from error
     except ValueError as error:
         raise refused(document, keys, str(error)) from error
-
-
-def _node(document: Document, keys: Keys) -> Any:
-    node: Any = document.tables
-    for key in keys:
-        node = node.get(key) if isinstance(node, Mapping) else None
-    return node

@@ -1,6 +1,6 @@
 """Test rigs of a case: machines, rigid links, and the places of the body that supports and links hold."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 from cutsim.bodies.machine import Machine
@@ -31,26 +31,51 @@ def _link(domain: Domain, state: State, name: str, table: schema.Link, cracks: M
         with refusing(domain.document, *key, "attachments", part):
             attachments.append(Attachment(entities, where.along, dim, part))
     corners = {*table.corners, *(corner for value in table.motion.values() for corner in corners_of(value))}
+    drive = machines(domain, key, table.machines)
     with refusing(domain.document, *key):
         return RigidLink(
             state,
             attachments,
             table.reference,
             motion=table.motion,
-            machines=machines(table.machines),
+            machines=drive,
             name=name,
             corners=tuple(sorted(corners)),
         )
 
 
-def machines(tables: Iterable[schema.Machine | schema.TurningMachine]) -> tuple[Machine, ...]:
-    """Machines of a tool or a link."""
-    return tuple(
-        Machine(
-            t.axis, t.stiffness, t.damping, t.mass, t.force, t.weight, t.velocity, (*t.corners, *corners_of(t.force))
+def machines(domain: Domain, key: Keys, tables: Sequence[schema.AnyMachine]) -> tuple[Machine, ...]:
+    """Machines of a tool, a carriage or a link.
+
+    Args:
+        domain: Mesh of the case.
+        key: Key of what they drive.
+        tables: The machines.
+
+    Raises:
+        CaseError: A machine refuses a parameter.
+    """
+    return tuple(machine(domain, (*key, "machines", i), table) for i, table in enumerate(tables))
+
+
+def machine(domain: Domain, key: Keys, table: schema.AnyMachine) -> Machine:
+    """Machine of a table with a given key.
+
+    Raises:
+        CaseError: It refuses a parameter.
+    """
+    with refusing(domain.document, *key):
+        corners = (*table.corners, *corners_of(table.force))
+        return Machine(
+            table.axis,
+            table.stiffness,
+            table.damping,
+            table.mass,
+            table.force,
+            table.weight,
+            table.velocity,
+            corners,
         )
-        for t in tables
-    )
 
 
 def place(

@@ -11,7 +11,7 @@ from cutsim.cases.quantities import consistent
 from cutsim.cases.schema_heat import Heat
 from cutsim.cases.schema_materials import AnyMaterial, Law
 from cutsim.cases.schema_mesh import Mesh, Selection
-from cutsim.cases.schema_parts import AnyTool, Body, Crack, Layer, Load, Pair, Support
+from cutsim.cases.schema_parts import AnyTool, Body, Carriage, Crack, Layer, Load, Pair, Support
 from cutsim.cases.schema_rigs import Link
 from cutsim.cases.schema_run import Analysis, AnyInsertion, Measure, Output, Solver, Steps
 from cutsim.cases.tables import Table, Varying
@@ -51,7 +51,7 @@ class Parts(Table):
 
     Args:
         mesh: Mesh: a file, or a built-in geometry.
-        groups: Further groups of facets and cells by name, selected from those of the mesh.
+        groups: Further groups of facets, cells and vertices by name, selected from those of the mesh.
         layers: Layers of a block, from the surface downwards; with the geometry "laminate".
         material: Material of bodies and layers that have none of their own.
         law: Cohesive law of cracks and layers that have none of their own.
@@ -59,6 +59,7 @@ class Parts(Table):
         cracks: Cracks by name.
         pairs: Pairs of surfaces that touch, by name.
         tools: Rigid tools by name.
+        carriages: Rigid carriages by name, each of which carries tools that machines drive together.
         insertion: Insertion of a blade or needle along a crack, ready-made: cracks, supports and motion follow.
         supports: Prescribed displacements by name.
         links: Rigid parts of a test rig by name: plates that may turn, pins, levers.
@@ -75,6 +76,7 @@ class Parts(Table):
     cracks: dict[Named, Crack] = Field(default_factory=dict)
     pairs: dict[Named, Pair] = Field(default_factory=dict)
     tools: dict[Named, AnyTool] = Field(default_factory=dict)
+    carriages: dict[Named, Carriage] = Field(default_factory=dict)
     insertion: AnyInsertion | None = None
     supports: dict[Named, Support] = Field(default_factory=dict)
     links: dict[Named, Link] = Field(default_factory=dict)

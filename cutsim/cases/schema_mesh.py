@@ -89,11 +89,13 @@ Range = tuple[Length, Length]
 
 
 class Selection(Table):
-    """Group of facets or cells, selected from groups of the mesh by the coordinates of their middles.
+    """Group of facets, cells or vertices, selected from groups of the mesh by the coordinates of their middles.
 
     Args:
         facets: Groups of facets from which it is selected.
         cells: Groups of cells from which it is selected.
+        vertices: Groups from whose vertices it is selected, of vertices, facets or cells: such as those of a line.
+        points: Points to which the nearest vertices make the group [length].
         x: Lowest and highest x; by default any [length].
         y: Lowest and highest y [length].
         z: Lowest and highest z [length].
@@ -101,12 +103,14 @@ class Selection(Table):
 
     facets: Groups = ()
     cells: Groups = ()
+    vertices: Groups = ()
+    points: tuple[tuple[Length, ...], ...] = ()
     x: Range | None = None
     y: Range | None = None
     z: Range | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> "Selection":
-        if bool(self.facets) == bool(self.cells):
-            raise ValueError("must have either facets or cells")
+        if sum(map(bool, (self.facets, self.cells, self.vertices, self.points))) != 1:
+            raise ValueError("must have one of facets, cells, vertices and points")
         return self

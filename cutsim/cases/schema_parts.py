@@ -8,7 +8,7 @@ from cutsim.base.units import Density, Length, Number, Stress, Time, Viscosity
 from cutsim.cases.classes import classes
 from cutsim.cases.constructed import Constructed, FromTable, With
 from cutsim.cases.expressions import TimeValue
-from cutsim.cases.names import BodyNames, ExistingFile, Group, Groups, Surfaces
+from cutsim.cases.names import BodyNames, CarriageName, ExistingFile, Group, Groups, Surfaces
 from cutsim.cases.schema_materials import AnyMaterial, Contact, Friction, Law, LawOrNone
 from cutsim.cases.schema_motion import Motion, Rotation
 from cutsim.cases.schema_rigs import Machines, Place
@@ -142,18 +142,45 @@ class Pair(Interface):
     search: Annotated[Length, POSITIVE] | None = None
 
 
-class Tool(Constructed):
+class Moved(Table):
+    """What tools and carriages have in common: a prescribed motion.
+
+    Args:
+        position: Position of its reference point, one number or expression in t a component [length].
+        rotation: Rotation about its reference point, one number or expression in t: an angle in the plane,
+            counterclockwise; in space three, the components of a rotation vector [rad].
+        path: Motion of its reference point, as points at times, or as a feed with a sawing stroke, a slice or rocking.
+        corners: Times at which its velocity jumps; those of `path` are known [time].
+    """
+
+    position: tuple[Displacement, ...] | None = None
+    rotation: Rotation | None = None
+    path: Motion | None = None
+    corners: tuple[Time, ...] = ()
+
+
+class Carriage(Moved):
+    """Rigid carriage that machines drive and that carries one tool or several, which share its unknown motion.
+
+    Along the axes of the machines each of its tools is ahead of its own path by as much as the carriage is ahead of
+    its path, and turns about the reference point of the carriage.
+
+    Args:
+        machines: What drives it along some axes, one machine or several; its path there is that of the machines.
+        release: Time until which it follows its path; then the machines take over, with their initial velocity [time].
+    """
+
+    machines: Machines
+    release: Annotated[Time, NONNEGATIVE] = 0.0
+
+
+class Tool(Moved, Constructed):
     """Rigid tool.
 
     Args:
         friction: Friction coefficient [–], or a law.
         surfaces: Groups of outer facets, and faces of cracks such as "glue+", that it can touch. A tool that is
             inserted needs none.
-        position: Position of its reference point, one number or expression in t a component [length].
-        rotation: Rotation about its reference point, one number or expression in t: an angle in the plane,
-            counterclockwise; in space three, the components of a rotation vector [rad].
-        path: Motion of its reference point, as points at times, or as a feed with a sawing stroke, a slice or rocking.
-        corners: Times at which its velocity jumps; those of `path` are known [time].
         contact: Contact law; by default a penalty of 10 E/h, and that of an inserted tool is its own.
         allowed_penetration: If given, the contact is augmented until no facet penetrates more than this in the mean
             [length].
@@ -161,18 +188,16 @@ class Tool(Constructed):
             [length].
         machines: What drives it along some axes, one machine or several: its motion there is found, and its path is
             that of the machine. Not for an inserted tool; a tool of triangles is not turned by them.
+        carriage: Name of the carriage that it shares with other tools, in place of machines of its own.
     """
 
     friction: Annotated[Friction, NONNEGATIVE] = 0.0
     surfaces: Surfaces = ()
-    position: tuple[Displacement, ...] | None = None
-    rotation: Rotation | None = None
-    path: Motion | None = None
-    corners: tuple[Time, ...] = ()
     contact: Contact | None = None
     allowed_penetration: Annotated[Length, POSITIVE] | None = None
     allowed_slip: Annotated[Length, POSITIVE] | None = None
     machines: Machines = ()
+    carriage: CarriageName | None = None
 
     @property
     def pointed(self) -> bool:

@@ -23,7 +23,7 @@ from cutsim.base.units import KINDS, Length, Number, Time
 from cutsim.bodies.schemes import Newmark, Scheme
 from cutsim.cases.constructed import Constructed, FromTable, With, annotated, choice, made, table_of
 from cutsim.cases.expressions import RowExpression
-from cutsim.cases.names import BodyName, CrackName, ToolName
+from cutsim.cases.names import BodyName, CrackName, Groups, ToolName
 from cutsim.cases.schema_rigs import Machine
 from cutsim.cases.tables import NONNEGATIVE, POSITIVE, Flag, Table, Whole, chosen_by
 from cutsim.studies.body import Faces
@@ -139,6 +139,17 @@ class Front(Table):
     level: Number = 0.5
 
 
+class Size(Table):
+    """Length or area of facets in the reference configuration, as a column of the history, for use in formulas.
+
+    Args:
+        facets: Groups of facets, outer or inner ones.
+    """
+
+    kind: Literal["area"]
+    facets: Groups
+
+
 class DomainIntegral(Table):
     """J-integral of a crack front over a domain around it, as a column of the history.
 
@@ -181,9 +192,9 @@ class Formula(Table):
 
 
 Measure = Annotated[
-    Front | DomainIntegral | Formula,
+    Front | Size | DomainIntegral | Formula,
     Field(discriminator="kind"),
-    chosen_by("kind", ["front", "j-integral", "formula"]),
+    chosen_by("kind", ["front", "area", "j-integral", "formula"]),
 ]
 
 

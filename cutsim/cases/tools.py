@@ -1,11 +1,12 @@
 """Rigid tools of a case."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from cutsim.base.checks import require
+from cutsim.bodies.machine import Machine
 from cutsim.bodies.solid import Solid
 from cutsim.cases import schema_parts as schema
 from cutsim.cases.bodies import softest
@@ -22,6 +23,7 @@ from cutsim.fields.state import State
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
+from cutsim.tools.carriage import Carriage
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import ToolPath
@@ -39,12 +41,21 @@ def tools(
         CaseError: A surface is unknown, or a tool refuses a parameter.
     """
     found: dict[str, RigidTool] = {}
+    shared = {name: _carriage(domain, solids[0].state, name) for name in domain.tables.carriages}
     for name, table in domain.tables.tools.items():
+        drive = shared.get(table.carriage or "") or machines(domain, ("tools", name), table.machines)
         if isinstance(table, schema.SurfaceTool):
-            found[name] = _triangulated(domain, solids, name, table, cracks, temperature)
+            found[name] = _triangulated(domain, solids, name, table, cracks, temperature, drive)
         else:
-            found[name] = _shaped(domain, solids, name, table, cracks, temperature)
+            found[name] = _shaped(domain, solids, name, table, cracks, temperature, drive)
     return found
+
+
+def _carriage(domain: Domain, state: State, name: str) -> Carriage:
+    key, table = ("carriages", name), domain.tables.carriages[name]
+    drive = machines(domain, key, table.machines)
+    with refusing(domain.document, *key):
+        return Carriage(state, path_of(table), drive, name=name, release=table.release)
 
 
 def _shaped(
@@ -54,6 +65,7 @@ def _shaped(
     table: schema.Tool,
     cracks: Mapping[str, Crack],
     temperature: Temperature | None,
+    drive: Sequence[Machine] | Carriage,
 ) -> ToolContact:
     key, shape, state = ("tools", name), table.made, solids[0].state
     surfaces = [_surface(domain, state, (*key, "surfaces"), surface, cracks) for surface in table.surfaces]
@@ -69,7 +81,7 @@ def _shaped(
             friction=friction,
             allowed_penetration=table.allowed_penetration,
             name=name,
-            machines=machines(table.machines),
+            machines=drive,
         )
 
 
@@ -80,6 +92,7 @@ def _triangulated(
     table: schema.SurfaceTool,
     cracks: Mapping[str, Crack],
     temperature: Temperature | None,
+    drive: Sequence[Machine] | Carriage,
 ) -> TriangulatedTool:
     key, state = ("tools", name), solids[0].state
     face = Face.joined(faces_of(domain, (*key, "surfaces"), table.surfaces, cracks))
@@ -100,7 +113,7 @@ def _triangulated(
             friction=friction,
             allowed_penetration=table.allowed_penetration,
             search=table.search,
-            machines=machines(table.machines),
+            machines=drive,
             name=name,
         )
 
@@ -123,8 +136,8 @@ def _contact(shape: object, solids: tuple[Solid, ...], surfaces: list[Surface]) 
     return shape.contact(young, h) if isinstance(shape, Pointed) else PenaltyContact.automatic(young, h)
 
 
-def path_of(table: schema.Tool) -> ToolPath:
-    """Motion of a tool.
+def path_of(table: schema.Moved) -> ToolPath:
+    """Motion of a tool or a carriage.
 
     Raises:
         ValueError: A motion that turns has a rotation beside it, or a parameter of the motion is refused.
