@@ -76,9 +76,20 @@ def test_a_search_that_crawls_is_given_up_if_it_is_to_be():
     crawling = [0.99**k for k in range(6)]  # 0.951 after five
     falling = [0.98**k for k in range(6)]
     assert reason(*crawling) is Reason.GOING_ON
-    assert reason(*crawling, patient=False) is Reason.STALLED
-    assert reason(*crawling[:5], patient=False) is Reason.GOING_ON
-    assert reason(*falling, patient=False) is Reason.GOING_ON
+    assert reason(*crawling, line_search="bt") is Reason.STALLED
+    assert reason(*crawling, line_search="l2") is Reason.GOING_ON
+    assert reason(*crawling[:5], line_search="bt") is Reason.GOING_ON
+    assert reason(*falling, line_search="bt") is Reason.GOING_ON
+
+
+@pytest.mark.parametrize("line_search", ["l2", "basic"])
+def test_a_search_that_goes_round_in_circles_is_given_up(line_search):
+    """After eight iterations in which the residual was never smaller than before; the start does not count."""
+    circles = [1e-4, 10.0, 0.4, *(2.0, 0.5, 0.4) * 3]
+    assert reason(*circles[:10], line_search=line_search) is Reason.GOING_ON
+    assert reason(*circles[:11], line_search=line_search) is Reason.STALLED
+    assert reason(*circles[:10], 0.39, line_search=line_search) is Reason.GOING_ON
+    assert reason(*circles) is Reason.GOING_ON, "a path has no line search"
 
 
 def test_a_start_after_a_pause_is_no_new_iterate():

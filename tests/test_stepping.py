@@ -114,15 +114,18 @@ class Failing:
 
 @pytest.mark.mpi
 def test_run_goes_on_after_failures():
-    """The third step fails with both line searches and is cut; the end is that of a run with the same times."""
-    control = StepControl(0.2, 0.2, line_searches=("basic", "bt"))
+    """The third step fails and is halved, fails by both line searches and is cut by more.
+
+    The end is that of a run with the same times.
+    """
+    control = StepControl(0.05, 0.1, growth=1.1, line_searches=("basic", "bt"))
     failing = everything()
-    watch = Failing(failing, lambda call: call in (3, 4))
+    watch = Failing(failing, lambda call: call in (3, 4, 5))
     reports = []
     run(failing, 1.0, control, reports.append)
-    assert watch.searches[2:5] == ["basic", "bt", "basic"]
-    assert [r.cuts for r in reports[:4]] == [0, 0, 1, 0]
-    assert reports[2].dt == pytest.approx(0.1)
+    assert watch.searches[2:6] == ["basic", "basic", "bt", "basic"]
+    assert [r.cuts for r in reports[:4]] == [0, 0, 2, 0]
+    assert reports[2].dt == pytest.approx(control.next(reports[1]) / 2 / 4)
     assert reports[-1].time == 1.0
     again = everything()
     for report in reports:
@@ -230,10 +233,36 @@ def test_every_corner_is_met():
     assert steps.max() <= 0.2 * 1.1
 
 
-def test_steps_grow_while_they_are_easy():
+def test_equal_steps_are_kept_by_another_line_search():
+    mechanics = everything()
+    watch = Failing(mechanics, lambda call: call == 2)
+    reports = []
+    run(mechanics, 0.6, StepControl.fixed(0.2), reports.append)
+    assert watch.searches == ["bt", "bt", "l2", "bt"] and [r.time for r in reports] == pytest.approx([0.2, 0.4, 0.6])
+
+
+@pytest.mark.parametrize(("iterations", "power"), [(1, 2), (3, 2), (4, 1.5), (6, 1), (12, 0.5), (24, 0.25)])
+def test_steps_grow_the_less_the_more_iterations_they_take(iterations, power):
+    control, solved = StepControl(1e-3, 1.0, growth=1.5, easy=6), Outcome(True, 2, "converged", iterations, 0, ())
+    report = StepReport(1, 1.0, 4e-3, solved)
+    assert control.next(report) == pytest.approx(1.5**power * 4e-3)
+    assert control.next(replace(report, dt=1.0)) == 1.0
+    assert control.next(replace(report, cuts=1)) == 4e-3 and control.next(replace(report, corner=True)) == 1e-3
+
+
+def test_a_solve_that_fails_again_is_cut_by_more():
+    """A refusal of a step that was solved is not: its error falls with its size."""
+    control, failed = StepControl(1e-2, 1.0, cut=0.5), Outcome(False, -1, "no convergence", 25, 0, ())
+    report = StepReport(1, 1.0, 1.0, failed, refusal="no convergence")
+    assert [control.next(replace(report, cuts=cuts)) for cuts in range(3)] == [0.5, 0.25, 0.125]
+    solved = replace(report, outcome=replace(failed, converged=True))
+    assert [control.next(replace(solved, cuts=cuts)) for cuts in range(3)] == [0.5, 0.5, 0.5]
+
+
+def test_steps_grow_to_the_largest():
     rows = history(opening_blocks(law=EXPONENTIAL), 0.02, StepControl(1e-3, 4e-3, growth=1.5))
     steps = np.diff([0.0, *rows["time"]])
-    np.testing.assert_allclose(steps[:4], [1e-3, 1.5e-3, 2.25e-3, 3.375e-3])
+    assert steps[0] == 1e-3 and 2e-3 < steps[1] < steps[2]
     assert steps.max() <= 4e-3 * 1.1
 
 

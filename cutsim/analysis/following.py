@@ -49,7 +49,7 @@ def follow(problem: Problem, control: Control, corner: float) -> StepReport | No
         if tried.refusal is None:
             return tried
         logger.info("step along the path of %.3g rejected (%s)", size, tried.refusal)
-        size, cuts = _CUT * size, cuts + 1
+        size, cuts = _CUT ** (1 + cuts) * size, cuts + 1
     problem.state.rollback()
     return None
 

@@ -5,7 +5,7 @@ the equilibrium path, a step with a brake) → trial history → accept or rejec
 """
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import FrameType
@@ -24,6 +24,7 @@ from cutsim.analysis.steps import (
     begin,
     drift,
     failure,
+    grown,
     reported,
 )
 from cutsim.base.checks import above, at_least, between, count, positive, require, require_number
@@ -59,13 +60,14 @@ class StepControl:
         first: First step, and the first one after each corner of a path [time].
         largest: Largest step [time].
         smallest: Step below which the run gives up [time]; a thousandth of `first` by default.
-        growth: Factor after an easy step, > 1.
-        cut: Factor after a rejected step, in (0, 1).
-        easy: Newton iterations up to which a step counts as easy.
+        growth: Factor after a step that took `easy` iterations, > 1.
+        cut: Factor after a rejected step, in (0, 1); where a solve fails again its square, its cube, and so on.
+        easy: Newton iterations after which a step grows by `growth`: half as many let it grow by the square, twice as
+            many by the root.
         damage: Largest growth of damage at a point in a step, in (0, 1]; None for no limit.
         closure: Largest part of the turnover that the energy audit may miss by a step; None for no limit.
-        line_searches: Line searches tried in turn for the same step. For tools the default is best; for cracks in
-            stiff, slender bodies ("basic", "l2", "bt").
+        line_searches: Line searches tried in turn for the same step; where steps may grow, the first one for half of
+            it before. For tools the default is best; for cracks in stiff, slender bodies ("basic", "l2", "bt").
         path: How the equilibrium path is followed where no step in time succeeds.
 
     Raises:
@@ -113,13 +115,16 @@ class StepControl:
         return None
 
     def next(self, report: StepReport) -> float:
-        """Grow after an easy step, cut one that failed and keep its size, start anew at a corner."""
+        """Grow by the iterations of a step, cut one that failed and keep its size, start anew at a corner.
+
+        A solve that fails again is cut by more each time: where a body snaps, a step some orders smaller is needed, and
+        all those in between would fail as well.
+        """
         if report.refusal is not None:
-            return self.cut * report.dt
+            return self.cut ** (1 if report.outcome.converged else 1 + report.cuts) * report.dt
         if report.corner:
             return self.first
-        easy = not report.cuts and report.outcome.iterations <= self.easy
-        return min(report.dt * self.growth if easy else report.dt, self.largest)
+        return min(grown(report, self.growth, self.easy), self.largest)
 
 
 class Interrupted(KeyboardInterrupt):
@@ -207,14 +212,17 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
     while True:
         start = state.time_old
         end = corner if start + (1 + _SLIVER) * size >= corner else start + size
-        tried = replace(_attempt(problem, control, end, predict=pace.smooth and not cuts, drag=drag), cuts=cuts)
+        # where the last step tells where the next one leads, a smaller one is the better help; but not in a jump
+        predict = pace.smooth and not (drag and cuts)
+        searches = control.line_searches[: 1 if predict and not cuts and control.first < control.largest else None]
+        tried = replace(_attempt(problem, control, end, searches, predict=predict, drag=drag), cuts=cuts)
         if tried.refusal is None:
             return _accept_in_time(problem, control, replace(tried, corner=end == corner), size, drag)
         state.rollback()
         size, cuts = control.next(tried), cuts + 1
         require("control.next(report)", size, size < tried.dt, f"less than {tried.dt:.6g} after a rejected step")
         logger.info("step to %.6g rejected (%s); next try %.3g", end, tried.refusal, size)
-        if not followed and (size < control.smallest or _eager(problem, control)):
+        if not (followed or drag) and (size < control.smallest or _eager(problem, control)):
             followed = True
             if (along := follow(problem, control, corner)) is not None:
                 logger.info("from time %.6g the equilibrium path is followed", start)
@@ -235,18 +243,18 @@ def _accept_in_time(problem: Problem, control: Control, report: StepReport, size
     if report.cuts and control.next(replace(report, refusal="")) < control.smallest:
         state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
     following = control.next(replace(report, dt=size))
-    smooth, turned = not report.corner and not report.cuts, state.pace.committed.turned
+    smooth, turned = not report.corner, state.pace.committed.turned
     return _accept(problem, report, Pace(repr(control), following, smooth=smooth, turned=turned))
 
 
 def _pace_braked(problem: Problem, control: Control, report: StepReport, size: float, drag: float) -> Pace:
     """How a run goes on after a step with a brake: by longer ones, and without it when they are long again."""
     turned = problem.state.pace.committed.turned
-    size = (_RELEASE if report.outcome.iterations <= _EASY else 1.0) * size
+    size = grown(replace(report, dt=size), _RELEASE, _EASY)
     if size >= control.first:
         logger.info("at time %.6g the brake is released", report.time)
-        return Pace(repr(control), control.first, turned=turned)
-    return Pace(repr(control), size, turned=turned, drag=drag)
+        drag = 0.0
+    return Pace(repr(control), min(size, control.first), smooth=not report.cuts, turned=turned, drag=drag)
 
 
 def _accept(problem: Problem, report: StepReport, pace: Pace) -> StepReport:
@@ -268,10 +276,12 @@ def _no_step(problem: Problem, control: Control, report: StepReport) -> StepErro
     )
 
 
-def _attempt(problem: Problem, control: Control, end: float, *, predict: bool, drag: float) -> StepReport:
-    """Solve the step to `end`."""
+def _attempt(
+    problem: Problem, control: Control, end: float, searches: Sequence[str], *, predict: bool, drag: float
+) -> StepReport:
+    """Solve the step to `end` by the first line search that does; the first one may start where the last step leads."""
     state = problem.state
-    for retry, line_search in enumerate(control.line_searches):
+    for retry, line_search in enumerate(searches):
         state.rollback()
         begin(problem, end)
         if drag and problem.brake is not None:

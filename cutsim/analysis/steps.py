@@ -207,12 +207,16 @@ class Control(Protocol):
         """First step [time]."""
 
     @property
+    def largest(self) -> float:
+        """Size to which steps may grow [time]; where it is `first`, all of them are to be equal."""
+
+    @property
     def smallest(self) -> float:
         """Step below which the run gives up [time]."""
 
     @property
     def line_searches(self) -> tuple[str, ...]:
-        """Line searches tried in turn for the same step."""
+        """Line searches tried in turn for the same step; where steps may grow, the first one for half of it before."""
 
     @property
     def path(self) -> PathFollowing:
@@ -223,6 +227,19 @@ class Control(Protocol):
 
     def next(self, report: StepReport) -> float:
         """Size of the next step, after one that was accepted or not [time]."""
+
+
+def grown(report: StepReport, growth: float, easy: int) -> float:
+    """Size of the step after an accepted one, by its iterations; that of one that was cut first.
+
+    Args:
+        report: The step.
+        growth: Factor after one that took `easy` iterations; half as many or less let it grow by the square, twice as
+            many by the root. So steps do not stay short where all of them are hard.
+        easy: This number of iterations.
+    """
+    power = 0.0 if report.cuts else easy / max(report.outcome.iterations, 0.5 * easy)
+    return float(growth**power * report.dt)
 
 
 def begin(problem: Problem, end: float) -> None:

@@ -23,8 +23,8 @@ BC_ROUNDING = 1e-12
 GROWTH = 1e6
 #: A backtracking search crawls at a kink: it is given up where the residual has not fallen to this fraction ...
 STALLED = 0.95
-#: ... in so many iterations.
-STALL = 5
+#: ... in so many iterations. Other searches are given up after so many in which the residual is never smaller.
+STALL, WANDERING = 5, 8
 
 
 class Reason(Enum):
@@ -172,17 +172,18 @@ class Judge:
         self.criteria, self._h = criteria, h
         self.start(0.0)
 
-    def start(self, force: float, *, patient: bool = True) -> None:
+    def start(self, force: float, *, line_search: str = "") -> None:
         """Begin a solve.
 
         Args:
             force: Force scale of the last converged solve [force].
-            patient: Whether to go on where the residual hardly falls any more.
+            line_search: The line search, by which a solve is given up where the residual hardly falls any more; empty
+                for never.
         """
         self.residuals: list[float] = []
         self.history: list[Iteration] = []
         self.force, self.scale = 0.0, force
-        self._before, self._patient, self._size = force, patient, 0.0
+        self._before, self._line_search, self._size = force, line_search, 0.0
 
     @property
     def length(self) -> float:
@@ -250,8 +251,12 @@ class Judge:
 
     def _stalls(self, free: float) -> bool:
         r = self.residuals
-        # one more iteration at a kink costs as much as any, and the next line search gets past it
-        return not self._patient and len(r) > STALL and free > STALLED * r[-1 - STALL]
+        if self._line_search == "bt":
+            # one more iteration at a kink costs as much as any, and the next line search gets past it
+            return len(r) > STALL and free > STALLED * r[-1 - STALL]
+        # one that goes round in circles seldom leaves them; where it starts it may be close by chance
+        wanders = len(r) > 1 + WANDERING and min(r[-WANDERING:]) >= min(r[1:-WANDERING])
+        return bool(self._line_search) and wanders
 
 
 def table(history: Sequence[Iteration]) -> str:

@@ -130,7 +130,7 @@ class Iterations:
         self._system.forces.prescribe()
         self.measures.start(x)
         judge = self.judge
-        judge.start(force, patient=self.line_search != "bt")
+        judge.start(force, line_search=self.line_search)
         iterations, linear = self._iterate()
         self._system.assign(self._x.array_r)
         reason = self.snes.getConvergedReason()

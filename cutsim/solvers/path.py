@@ -111,7 +111,7 @@ class PathIterations:
     def _iterate(self, step: PathStep, force: float) -> tuple[int, Reason, str]:
         """Number of iterations, and why they end, perhaps in words of its own."""
         judge, norms = self._iterations.judge, self._iterations.measures
-        judge.start(force, patient=True)
+        judge.start(force)
         here = self._at(step, self._system.unknowns, step.after)
         norms.start(here.x)
         for iteration in range(ITERATIONS + 1):
