@@ -363,6 +363,7 @@ def test_an_unknown_line_search_is_refused():
         (10_000, 1, False, 3, "direct", None),
         (19_999, 3, True, 3, "direct", None),
         (60_000, 1, True, 2, "direct", None),
+        (25_000, 2, True, 2, "direct", None),
         (10_001, 1, False, 3, "bulk", "richardson"),
         (100_000, 2, False, 3, "bulk", "chebyshev"),
         (20_000, 1, True, 3, "factor", None),
@@ -378,6 +379,25 @@ def test_preset_by_size(n_dofs, ranks, has_interface, gdim, name, smoother, symm
     factorised = preset.kept if name == "direct" else preset.strip
     assert preset.kept["pc_type"] == {"direct": factor, "factor": "cholesky"}.get(name, "gamg")
     assert factorised.get("pc_type") == (None if name == "bulk" else factor)
+
+
+def test_small_problems_of_the_plane_have_a_factor_of_their_own():
+    """It is checked by the Krylov method, and where it needs pivots MUMPS finds them."""
+    native = preset_for(25_000, True, 1, True, 2)
+    assert native.name == "native" and native.kept["pc_factor_mat_solver_type"] == "petsc"
+    assert preset_for(1_000, True, 1, True, 2, saddle_point=True).name == "direct"
+    assert fallback_for(native, 25_000, True, 1).name == "direct"
+
+
+def test_a_factor_that_needs_pivots_is_replaced(caplog):
+    def crossed(u, v):
+        return ((u[0] - 1.0) * v[1] + (u[1] - 2.0) * v[0]) * ufl.dx
+
+    with Block(square(MPI.COMM_SELF), crossed, bcs=[]) as block:
+        assert block.problem.linear_solver.startswith("a factorisation without pivots")
+        assert block.problem.solve().converged and block.problem.kept.linear_solver == "direct"
+        np.testing.assert_allclose(block.u.x.array.reshape(-1, 2), np.tile([1.0, 2.0], (81, 1)), rtol=1e-9)
+    assert "'native' failed: 'direct' from now on" in caplog.text
 
 
 def test_the_fallback_of_a_kept_factor_is_multigrid():

@@ -17,6 +17,7 @@ FACTOR_SHARE = 0.6
 
 #: The presets in words.
 DESCRIPTIONS = {
+    "native": "a factorisation without pivots, kept while it serves",
     "direct": "a factorisation, kept while it serves",
     "bulk": "multigrid",
     "factor": "a kept factor, and an exact one of the strip along the crack",

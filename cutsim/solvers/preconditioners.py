@@ -1,7 +1,7 @@
 """Preconditioners for the tangent: which one fits, how it is built, and when it is rebuilt."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,9 @@ from cutsim.base.assembly import Array, owned_vector
 DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 10_000}
 #: The same with a crack: nearly incompressible, stretched cells under a blade cost multigrid 45 iterations a solve.
 DIRECT_LIMIT_CRACK = {1: 1_000_000, 2: 100_000, 3: 60_000}
+#: Unknowns in the plane up to which, on one rank, PETSc's own factor without pivots is the faster: it takes longer to
+#: make than MUMPS's, the more so the larger it is, and half the time to apply, some twenty times for each time it is made.
+NATIVE_LIMIT = 25_000
 #: Unknowns of a body in space with a crack from which a kept factor of half the size is faster ...
 FACTOR_FROM = 20_000
 #: ... and up to which: operations of a factorisation grow with their square, those of multigrid in proportion.
@@ -28,7 +31,7 @@ class Preset:
     """Preset of a linear solver: a Krylov method, a preconditioner that is kept, and perhaps a strip along the crack.
 
     Attributes:
-        name: "direct", "bulk", "factor", "crack" or "saddle".
+        name: "native", "direct", "bulk", "factor", "crack" or "saddle".
         ksp: PETSc options of the Krylov method, without prefix.
         kept: PETSc options of the preconditioner kept by `LaggedPC`, without prefix.
         patience: Krylov iterations of one solve beyond which the kept preconditioner counts as stale, if that decides.
@@ -74,6 +77,8 @@ def preset_for(
         kept = _factor(symmetric=True) | {"mat_mumps_icntl_23": int(memory)}
         return Preset("factor", _flexible(1e-4, 100), kept, strip=_factor(symmetric))
     limit = (DIRECT_LIMIT_CRACK if has_interface or saddle_point else DIRECT_LIMIT)[gdim]
+    if gdim < 3 and ranks == 1 and n_dofs <= min(limit, NATIVE_LIMIT) and not saddle_point:
+        return _native()
     # multipliers beside a stiff crack leave the strip along it no place in the cycle
     if n_dofs <= (FALLBACK_LIMIT if has_interface and saddle_point else limit):
         return _direct(symmetric)
@@ -95,8 +100,8 @@ def fallback_for(failed: Preset, n_dofs: int, symmetric: bool, ranks: int) -> Pr
         ranks: Number of MPI ranks.
 
     Returns:
-        Multigrid where memory is short for a kept factor; else a factorisation, or None where that is what failed or
-        would not fit.
+        Multigrid where memory is short for a kept factor; else a factorisation with pivots, or None where that is what
+        failed or would not fit.
     """
     if failed.name == "factor":
         return _crack(symmetric, ranks)
@@ -125,6 +130,11 @@ def _direct(symmetric: bool) -> Preset:
 
 def _factor(symmetric: bool) -> dict[str, Any]:
     return {"pc_type": "cholesky" if symmetric else "lu", "pc_factor_mat_solver_type": "mumps"}
+
+
+def _native() -> Preset:
+    own = {"pc_type": "lu", "pc_factor_mat_solver_type": "petsc", "pc_factor_mat_ordering_type": "nd"}
+    return replace(_direct(symmetric=False), name="native", kept=own)
 
 
 def _schur(amg: Mapping[str, Any]) -> dict[str, Any]:
