@@ -16,7 +16,7 @@ DIRECT_LIMIT = {1: 1_000_000, 2: 100_000, 3: 10_000}
 #: The same with a crack: nearly incompressible, stretched cells under a blade cost multigrid 45 iterations a solve.
 DIRECT_LIMIT_CRACK = {1: 1_000_000, 2: 100_000, 3: 60_000}
 #: Unknowns in the plane up to which, on one rank, PETSc's own factor without pivots is the faster: it takes longer to
-#: make than MUMPS's, the more so the larger it is, and half the time to apply, some twenty times for each time it is made.
+#: make than MUMPS's, the more so the larger it is, but half the time to apply, and it is applied twenty times.
 NATIVE_LIMIT = 25_000
 #: Unknowns of a body in space with a crack from which a kept factor of half the size is faster ...
 FACTOR_FROM = 20_000
