@@ -4,6 +4,7 @@ Nothing outside this module asks which version is installed.  Each function has 
 is written for the older ones beside it.
 """
 
+import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import singledispatchmethod
 from pathlib import Path
@@ -70,6 +71,24 @@ def _forget_what_was_dispatched() -> None:
 
 
 _forget_what_was_dispatched()
+
+
+@functools.cache
+def _cell(name: str) -> ufl.Cell:
+    return ufl.Cell(name)
+
+
+def _remember_cells() -> None:
+    """Basix makes UFL's description of a cell, with all its sides, anew whenever an element is asked for its cell.
+
+    That was an eighth of the time in which kernels are generated.
+    """
+    for kind in _with_subclasses(basix.ufl._ElementBase):
+        if isinstance(vars(kind).get("cell"), property):
+            kind.cell = property(lambda element: _cell(element.cell_type.name))  # type: ignore[attr-defined]
+
+
+_remember_cells()
 
 
 # ---- forms and expressions

@@ -1,6 +1,7 @@
 """Just-in-time compilation of forms: the options of the C compiler, and the cache of compiled kernels."""
 
 import fcntl
+import functools
 import hashlib
 import os
 import platform
@@ -8,6 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -40,6 +42,8 @@ _PATIENCE = 600.0
 
 T = TypeVar("T")
 
+_seen = functools.cache(metadata.entry_points)
+
 
 def compiled(comm: MPI.Comm, compile_: Callable[[], T], directory: Path = CACHE_DIR) -> T:
     """Compile in the cache of kernels, having removed what a killed process left half built. Collective.
@@ -62,12 +66,23 @@ def compiled(comm: MPI.Comm, compile_: Callable[[], T], directory: Path = CACHE_
     began = time.monotonic()
     while True:
         try:
-            with _compiling(comm, directory):
+            with _compiling(comm, directory), _packages_seen_once():
                 return compile_()
         except (RuntimeError, TimeoutError) as error:
             again = "compilation timed out" in str(error) and time.monotonic() - began < _PATIENCE
             if not comm.bcast(again):  # rank 0 is the one that has waited and knows why
                 raise
+
+
+@contextmanager
+def _packages_seen_once() -> Iterator[None]:
+    """For each kernel setuptools, which calls the C compiler, looks through all installed packages six times."""
+    look = metadata.entry_points
+    metadata.entry_points = _seen  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        metadata.entry_points = look
 
 
 @contextmanager
