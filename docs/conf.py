@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import cutsim
+from docutils import nodes
 
 sys.path.insert(0, str(Path(__file__).parent))  # for demo_reader and make_api
 import make_api
@@ -32,6 +33,7 @@ myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 default_role = "py:obj"
+suppress_warnings = ["ref.python"]  # a name in a docstring that several classes have leads to the first
 autodoc_member_order = "bysource"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 autodoc_typehints = "description"
@@ -53,7 +55,17 @@ def plain_text(app, what, name, obj, options, lines):
         lines[i] = "".join(p if p.startswith("`") else re.sub(r"\||_(?!\w)", r"\\\g<0>", p) for p in parts)
 
 
+def through_links(app, doctree):
+    """Pages refer to lessons and programs by the links to their folders, which Sphinx follows out of this one."""
+    for node in doctree.findall(nodes.Element):
+        target = Path(node.get("reftarget") or "")
+        for folder in ("demos", "validation"):
+            if target.is_absolute() and target.is_relative_to((app.srcdir / folder).resolve()):
+                node["reftarget"] = f"{folder}/{target.name}"
+
+
 def setup(app):
     """Called by Sphinx."""
     make_api.reference_pages()
+    app.connect("doctree-read", through_links)
     app.connect("autodoc-process-docstring", plain_text, priority=100)

@@ -22,11 +22,7 @@ from cutsim.cases.tables import FORM, Flag, Table, Whole, chosen_by
 
 
 class Constructed(Table):
-    """Table of the parameters of a class of cutsim, which makes an object of it.
-
-    Attributes:
-        made: The object.
-    """
+    """Table of the parameters of a class of cutsim, which makes an object of it."""
 
     _made: Any = PrivateAttr(default=None)
 

@@ -26,7 +26,7 @@ class Checkpoints:
     """Checkpoints of a run, written every few minutes and at its end, also if it fails or is stopped. Collective.
 
     Give them to `Recording`, or use them as a recorder and context manager by themselves. A script that is to be
-    resumed builds its problem, resumes and runs; if there is no checkpoint yet, the run begins at its beginning:
+    resumed builds its problem, resumes and runs; if there is no checkpoint yet, the run begins at its beginning::
 
         checkpoints = Checkpoints("results/blade/checkpoint", cut.mechanics)
         checkpoints.resume()
