@@ -10,7 +10,7 @@ from cutsim.studies.mesh_rule import MeshRule
 from cutsim.tools.pointed import Blade
 
 #: Most unknowns of a cut in the plane and in space.
-LARGEST = {2: 8000, 3: 30000}
+LARGEST = {2: 8000, 3: 15000}
 #: Depth of the tip at the end, by dimension [mm].
 DEPTH = {2: 3.0, 3: 2.0}
 #: What the tool does: it stays, is drawn out, or is drawn out and pushed in once more.
