@@ -147,6 +147,16 @@ def test_another_line_search_saves_the_step():
     assert watch.searches == ["bt", "l2"]
 
 
+@pytest.mark.parametrize(("problem", "doubted"), [(everything, True), (opening_blocks, False)])
+def test_the_smallest_step_is_doubted_where_no_brake_is_left(problem, doubted):
+    mechanics = problem()
+    assert (mechanics.brake is None) == doubted
+    Failing(mechanics, lambda call: call <= 2)
+    report = run(mechanics, 0.2, StepControl(0.1, 0.1, smallest=0.05), stop=lambda report: True)
+    assert report.cuts == 1 and report.dt == pytest.approx(0.05)
+    assert ("smallest step" in mechanics.state.verdict.doubts) == doubted
+
+
 def test_smallest_step_is_named_and_history_is_kept(tmp_path):
     """A block pressed through itself: no step gets through, and the error says when, where and why."""
     b = make_blocks()

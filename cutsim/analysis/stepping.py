@@ -240,7 +240,8 @@ def _accept_in_time(problem: Problem, control: Control, report: StepReport, size
     state, start = problem.state, report.time - report.dt
     if drag:
         return _accept(problem, report, _pace_braked(problem, control, report, size, drag))
-    if report.cuts and control.next(replace(report, refusal="")) < control.smallest:
+    # with a brake the run would have gone on below it
+    if report.cuts and control.next(replace(report, refusal="")) < control.smallest and problem.brake is None:
         state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
     following = control.next(replace(report, dt=size))
     smooth, turned = not report.corner, state.pace.committed.turned
