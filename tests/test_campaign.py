@@ -3,6 +3,7 @@
 import pytest
 
 from campaign.draws import LARGEST, Draw
+from campaign.summary import PAGE, kept, page, summary, table
 from cutsim.cases import read_case
 
 
@@ -26,3 +27,39 @@ def test_case_files_are_right(dim, tmp_path):
         assert draw.rule.size <= draw.radius and draw.bond.opening < 0.22
         seen.add((draw.motion, draw.law, draw.notch))
     assert len(seen) > 3
+
+
+def cut(run, seconds, status=0, **found):
+    good = {"verdict": "trusted", "closure": 1e-3, "penetration": {"crack_penetration": 0.1}}
+    return {
+        "run": run,
+        "class": "2-D, push, rough, notch",
+        "dim": 2,
+        "status": status,
+        "seconds": seconds,
+        **good,
+        **found,
+    }
+
+
+def test_a_summary_names_what_is_not_good():
+    rows = [cut("a", 10.0), cut("b", 12.0), cut("c", 25.0, closure=0.02), cut("d", 99.0, status=3)]
+    rows.append(cut("e", 12.0, status=1, verdict="questionable", penetration={"notch_penetration": 0.6}))
+    words = "\n".join(summary(rows))
+    for finding in (
+        "4 of 5 come to their end, not d",
+        "median of their class: c",
+        "above 1%: c",
+        "above 0.5 h: e",
+        "trusted: e",
+    ):
+        assert finding in words
+    assert table(rows)[2] == "| 2-D, push, rough, notch | 5 | 4 | 3 | 3 | 12 | 2.0e-02 | 0.60 |"
+    assert table(rows)[-1].startswith("| all | 5 | 4 |")
+
+
+def test_the_page_has_the_table_of_the_results_that_are_kept():
+    assert kept() and page() == PAGE.read_text(encoding="utf-8")
+    for row in kept():
+        draw = Draw(**{name: row[name] for name in Draw.__dataclass_fields__})
+        assert draw.kind == row["class"]

@@ -9,22 +9,17 @@ import json
 import resource
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 import numpy as np
 from draws import LARGEST, Draw
+from summary import keep, read, summary
 
-from cutsim.commands.endings import Ending
-from cutsim.interface.doubts import DEEP
 from cutsim.results.folder import HISTORY
 from cutsim.results.run_files import RunFiles
 
-#: Closure of the energy audit that is good, and time over the median of a class that is.
-CLOSURE, SLOW = 0.01, 2.0
-_ENDED = (Ending.TRUSTED, Ending.QUESTIONABLE)
 _LOST = ("fracture", "friction", "viscous", "cohesive_viscous", "braked", "numerical")
 
 
@@ -34,7 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     folder = options.out / f"seed-{options.seed}"
     folder.mkdir(parents=True, exist_ok=True)
     results = folder / "results.jsonl"
-    rows = {row["run"]: row for row in _read(results)}
+    rows = {row["run"]: row for row in read(results)}
     for dim, number in ((2, options.plane), (3, options.space)):
         largest = options.unknowns if dim == 2 else LARGEST[3]
         for i in range(number):
@@ -44,7 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 with results.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(rows[name]) + "\n")
                 print(_line(rows[name]), flush=True)
-    print(*_summary(list(rows.values())), sep="\n")
+    print(*summary(list(rows.values())), sep="\n")
+    if options.keep:
+        keep(options.seed, results)
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -54,13 +51,11 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--space", type=int, default=20, metavar="N", help="cuts in space")
     parser.add_argument("--unknowns", type=int, default=LARGEST[2], help="most unknowns in the plane, about")
     parser.add_argument("--seconds", type=int, default=900, help="processor time at which a cut is ended")
+    parser.add_argument(
+        "--keep", action="store_true", help="keep the results beside this file, and a table in the docs"
+    )
     parser.add_argument("--out", type=Path, default=Path("results/campaign"), help="folder")
     return parser.parse_args(arguments)
-
-
-def _read(path: Path) -> list[dict[str, Any]]:
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    return [json.loads(line) for line in lines]
 
 
 def _run(name: str, draw: Draw, folder: Path, seconds: int) -> dict[str, Any]:
@@ -121,31 +116,6 @@ def _line(row: dict[str, Any]) -> str:
         f"closure {closure:.1e}  penetration {deepest:.2f} h  {row['steps']} steps, {row['rejected']} rejected, "
         f"{row['iterations']} iterations, {row['seconds']:.0f} s  {', '.join(row['doubts'])}"
     )
-
-
-def _summary(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """How many have come to their end, and what is to be said of these."""
-    for dim in sorted({row["dim"] for row in rows}):
-        some = [row for row in rows if row["dim"] == dim]
-        done = [row for row in some if row["status"] in _ENDED]
-        others = [row for row in some if row not in done]
-        yield f"{dim}-D: {len(done)} of {len(some)} come to their end, not {_names(others)}"
-        kinds = {row["class"] for row in done}
-        medians = {kind: median(row["seconds"] for row in done if row["class"] == kind) for kind in kinds}
-        findings = {
-            f"in more than {SLOW:g} times the median of their class": [
-                row for row in done if row["seconds"] > SLOW * medians[row["class"]]
-            ],
-            f"with a closure above {CLOSURE:.0%}": [row for row in done if row["closure"] > CLOSURE],
-            f"with a penetration above {DEEP:g} h": [row for row in done if max(row["penetration"].values()) > DEEP],
-            "not trusted": [row for row in done if row["verdict"] != "trusted"],
-        }
-        for words, found in findings.items():
-            yield f"  {len(found)} {words}: {_names(found)}"
-
-
-def _names(rows: Sequence[dict[str, Any]]) -> str:
-    return ", ".join(row["run"] for row in rows) or "–"
 
 
 if __name__ == "__main__":

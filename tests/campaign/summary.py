@@ -1,0 +1,119 @@
+"""What a campaign of random cuts has shown, in words and as the table of docs/when_a_run_does_not_converge.md."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from shutil import copyfile
+from statistics import median
+from typing import Any
+
+from cutsim.commands.endings import Ending
+from cutsim.interface.doubts import DEEP
+
+#: Results that are kept, a file for each seed, and the page with their table.
+KEPT = Path(__file__).parent / "results"
+PAGE = Path(__file__).parents[2] / "docs" / "when_a_run_does_not_converge.md"
+#: Closure of the energy audit that is good, and time over the median of a class that is.
+CLOSURE, SLOW = 0.01, 2.0
+_ENDED = (Ending.TRUSTED, Ending.QUESTIONABLE)
+_BEGIN, _END = "<!-- campaign: begin -->\n", "<!-- campaign: end -->"
+_TITLES = (
+    "cuts",
+    "number",
+    "to the end",
+    "of these trusted",
+    "in twice the median",
+    "median [s]",
+    "closure",
+    "penetration / h",
+)
+
+Row = dict[str, Any]
+
+
+def read(path: Path) -> list[Row]:
+    """Lines of a file of results; none if there is no file."""
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return [json.loads(line) for line in lines]
+
+
+def ended(row: Row) -> bool:
+    """Whether a cut has come to its end."""
+    return row["status"] in _ENDED
+
+
+def penetration(row: Row) -> float:
+    """Deepest penetration over the mesh size."""
+    return max(row["penetration"].values(), default=0.0)
+
+
+def medians(rows: Sequence[Row]) -> dict[str, float]:
+    """Processor time of the cuts that have come to their end, by class [s]."""
+    done = [row for row in rows if ended(row)]
+    return {kind: median(r["seconds"] for r in done if r["class"] == kind) for kind in {r["class"] for r in done}}
+
+
+def summary(rows: Sequence[Row]) -> Iterator[str]:
+    """How many have come to their end, and what is to be said of these, in words."""
+    usual = medians(rows)
+    for dim in sorted({row["dim"] for row in rows}):
+        some = [row for row in rows if row["dim"] == dim]
+        done = [row for row in some if ended(row)]
+        yield f"{dim}-D: {len(done)} of {len(some)} come to their end, not {_names([r for r in some if not ended(r)])}"
+        findings = {
+            f"in more than {SLOW:g} times the median of their class": [
+                row for row in done if row["seconds"] > SLOW * usual[row["class"]]
+            ],
+            f"with a closure above {CLOSURE:.0%}": [row for row in done if row["closure"] > CLOSURE],
+            f"with a penetration above {DEEP:g} h": [row for row in done if penetration(row) > DEEP],
+            "not trusted": [row for row in done if row["verdict"] != "trusted"],
+        }
+        for words, found in findings.items():
+            yield f"  {len(found)} {words}: {_names(found)}"
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """The table of the page: a line for each class, and one for all."""
+    usual, kinds = medians(rows), sorted({row["class"] for row in rows})
+    groups = [(kind, [row for row in rows if row["class"] == kind]) for kind in kinds]
+    lines = [_TITLES, ("---",) * len(_TITLES)]
+    lines += [_cells(kind, some, usual) for kind, some in [*groups, ("all", list(rows))]]
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def _cells(kind: str, rows: Sequence[Row], usual: dict[str, float]) -> tuple[str, ...]:
+    done = [row for row in rows if ended(row)]
+    if not done:
+        return (kind, str(len(rows)), "0", *["–"] * (len(_TITLES) - 3))
+    return (
+        kind,
+        str(len(rows)),
+        str(len(done)),
+        str(sum(row["verdict"] == "trusted" for row in done)),
+        str(sum(row["seconds"] <= SLOW * usual[row["class"]] for row in done)),
+        f"{median(row['seconds'] for row in done):.0f}",
+        f"{max(row['closure'] for row in done):.1e}",
+        f"{max(map(penetration, done)):.2f}",
+    )
+
+
+def kept() -> list[Row]:
+    """The results that are kept."""
+    return [row for path in sorted(KEPT.glob("seed-*.jsonl")) for row in read(path)]
+
+
+def page() -> str:
+    """The page with the table of the results that are kept."""
+    before, rest = PAGE.read_text(encoding="utf-8").split(_BEGIN)
+    return before + _BEGIN + "\n".join(["", *table(kept()), "", ""]) + _END + rest.split(_END)[1]
+
+
+def keep(seed: int, results: Path) -> None:
+    """Keep the results of a seed, and make the table of the page of all that are kept."""
+    KEPT.mkdir(exist_ok=True)
+    copyfile(results, KEPT / f"seed-{seed}.jsonl")
+    PAGE.write_text(page(), encoding="utf-8")
+
+
+def _names(rows: Sequence[Row]) -> str:
+    return ", ".join(row["run"] for row in rows) or "–"
