@@ -4,8 +4,9 @@ import re
 import sys
 from pathlib import Path
 
-import cutsim
 from docutils import nodes
+
+import cutsim
 
 sys.path.insert(0, str(Path(__file__).parent))  # for demo_reader and make_api
 import make_api
