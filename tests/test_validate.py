@@ -11,11 +11,14 @@ from cutsim.cases import built_in_cases
 from cutsim.commands.main import app
 from cutsim.results.run_files import Column, RunFiles
 from cutsim.validation.page import MARK, keyed, page, with_excerpts
+from cutsim.validation.peers import OURS, Comparisons, Solution
 from cutsim.validation.readings import ReadingError, read_value
 from cutsim.validation.results import Findings, Level, judge
 from cutsim.validation.rows import RowsError, read_rows
+from validation.peers import compare
 
 ROOT = Path(__file__).parents[1]
+VALIDATION = ROOT / "tests" / "validation"
 PROGRAM = """
 import json, pathlib, sys
 folder = pathlib.Path(sys.argv[-1])
@@ -182,7 +185,8 @@ def test_the_committed_page_is_made_of_the_committed_results():
     keys = [key for key, _ in keyed(groups)]
     assert list(found.results) == [key for key in keys if key in found.results], "results of rows that are gone"
     text = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
-    assert text == page(text, groups, found), "run: cutsim validate --page"
+    peers = Comparisons.read(VALIDATION / "peers" / "problems.toml", VALIDATION / "peers.json")
+    assert text == page(text, groups, found, peers), "run: cutsim validate --page"
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert readme == with_excerpts(readme, groups, found), "run: cutsim validate --page"
 
@@ -193,3 +197,64 @@ def test_what_the_rows_run_is_there():
     assert programs <= {path.stem for path in (ROOT / "tests" / "validation").glob("[a-z]*.py")}
     assert {run.case for run in runs if run.case} <= {*built_in_cases(), *map(str, ROOT.glob("tests/**/*.toml"))}
     assert sum(len(run.row) for run in runs) >= 80
+
+
+PROBLEMS = """
+[[problem]]
+name = "beam"
+what = "**Beam.**"
+unit = { "force" = "N", "ratio" = "" }
+program = [{ name = "cutsim", script = "ours.py" }, { name = "theirs", script = "theirs.py", module = "json" },
+  { name = "absent", script = "absent.py", module = "no_such_module_anywhere" },
+  { name = "mute", script = "mute.py", command = "no-such-command-anywhere" }]
+"""
+SOLVED = 'print(\'log\')\nprint(\'{{"values": {{"force": {}, "ratio": 1}}, {}}}\')\n'
+
+
+@pytest.fixture
+def peers(tmp_path):
+    """A problem that two programs solve, and two that are not installed."""
+    numbers = '"iterations": 3, "seconds": 1.5, "unknowns": 8'
+    (tmp_path / "problems.toml").write_text(PROBLEMS)
+    (tmp_path / "ours.py").write_text(SOLVED.format(2.0, numbers))
+    (tmp_path / "theirs.py").write_text(SOLVED.format(2.02, numbers + ', "version": "7.1"'))
+    return tmp_path
+
+
+def test_programs_are_compared_and_what_is_not_installed_keeps_its_results(peers, capsys):
+    data = peers / "peers.json"
+    old = Solution("beam", "mute", {"force": 3.0, "ratio": 1.0}, None, 9.0, 8, "long ago")
+    short = SOLVED.replace(', "ratio": 1', "")
+    (peers / "theirs.py").write_text(
+        short.format(2.02, '"iterations": 3, "seconds": 1.5, "unknowns": 8, "version": "7.1"')
+    )
+    gone = Solution("plate", "cutsim", {}, 1, 1.0, 1, "long ago")
+    Comparisons([], {("beam", "mute"): old, ("plate", "cutsim"): gone}).write(data)
+    compare.main(folder=peers, data=data)
+    said = capsys.readouterr().out
+    assert "beam, absent: not installed" in said and "No module named 'no_such_module_anywhere'" in said
+    assert "beam, mute: not installed (there is no command no-such-command-anywhere)" in said
+    found = Comparisons.read(peers / "problems.toml", data)
+    assert [program for _, program in found.solutions] == ["cutsim", "theirs", "mute"]
+    assert found.solutions["beam", "mute"] == old and "theirs 7.1" in found.solutions["beam", "theirs"].made
+    section = found.section()
+    assert section.startswith("**Beam.**") and "| program | force [N] | ratio |" in section
+    assert "| theirs | 2.02 | not reached | 1 % | 8 | 3 | 1.5 |" in section and "| absent | not run |" in section
+    assert "| mute | 3 | 1 | 50 % | 8 |  | 9.0 | long ago |" in section
+
+
+def test_a_script_that_fails_says_why(peers):
+    (peers / "ours.py").write_text("raise ValueError('no such beam')")
+    with pytest.raises(RuntimeError, match="no such beam"):
+        compare.main(folder=peers, data=peers / "peers.json")
+
+
+def test_scripts_of_all_peers_are_there_and_have_values_of_the_page():
+    comparisons = Comparisons.read(VALIDATION / "peers" / "problems.toml", VALIDATION / "peers.json")
+    assert len(comparisons.problems) >= 3
+    for problem in comparisons.problems:
+        assert problem.program[0].name == OURS
+        assert all((VALIDATION / "peers" / program.script).exists() for program in problem.program)
+    for (name, _), solution in comparisons.solutions.items():
+        (problem,) = (p for p in comparisons.problems if p.name == name)
+        assert solution.values and set(solution.values) <= set(problem.unit)

@@ -54,7 +54,7 @@ def command(
     screen = console()
     found = _results(chosen, folder, jobs, quick=quick, screen=screen)
     if not quick:
-        _write(read_rows(folder / "rows"), found, docs)  # anew: a run takes minutes, in which rows may be added
+        _write(read_rows(folder / "rows"), found, folder, docs)  # anew: a run takes minutes, in which rows may be added
     outside = [result for result in found if not result.inside]
     if found:
         rows = [[r.key, _short(r.values[-1]), _short(r.expected), "" if r.inside else r.reason] for r in found]
@@ -155,11 +155,12 @@ def _jobs(run: Run, folder: Path, base: Path, *, quick: bool) -> list[_TimedJob]
     return found
 
 
-def _write(groups: Sequence[Group], found: Sequence[Result], docs: Path) -> None:
+def _write(groups: Sequence[Group], found: Sequence[Result], folder: Path, docs: Path) -> None:
     """Keep results, and make the page and the tables of other pages of all that there are."""
     from cutsim.base.files import replace_file
     from cutsim.validation.figure import draw
     from cutsim.validation.page import FIGURE, keyed, page, with_excerpts
+    from cutsim.validation.peers import Comparisons
     from cutsim.validation.results import Findings
 
     data = docs / "validation" / "results.json"
@@ -170,8 +171,9 @@ def _write(groups: Sequence[Group], found: Sequence[Result], docs: Path) -> None
     if not (docs / FIGURE).exists() or found:
         (docs / FIGURE).parent.mkdir(exist_ok=True)
         draw(docs / FIGURE, groups, known)
+    peers = Comparisons.read(folder / "peers" / "problems.toml", folder / "peers.json")
     target, readme = docs / "validation.md", docs.parent / "README.md"
-    replace_file(target, page(target.read_text(encoding="utf-8"), groups, known).encode())
+    replace_file(target, page(target.read_text(encoding="utf-8"), groups, known, peers).encode())
     replace_file(readme, with_excerpts(readme.read_text(encoding="utf-8"), groups, known).encode())
 
 

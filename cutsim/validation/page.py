@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
+from cutsim.validation.peers import Comparisons
 from cutsim.validation.results import Findings, Result
 from cutsim.validation.rows import Group, Row
 
@@ -20,21 +21,29 @@ _HEAD = (
     "| what | expected | computed, coarse to fine | error | allowed | source | run |\n"
     "|---|---|---|---|---|---|---|\n"
 )  # fmt: skip
+_PEERS = (
+    "Each problem was solved by all programs on one machine, one after the other, each on one thread. Processor times "
+    "are those of the solution, without meshing and compilation. `tests/validation/peers/compare.py` runs all that are "
+    "installed."
+)
 _EXCERPT = re.compile(r"(<!-- validation: ([A-Za-z0-9/, -]+) -->\n).*?(<!-- end of validation -->\n)", re.DOTALL)
 
 
-def page(head: str, groups: Sequence[Group], found: Findings) -> str:
+def page(head: str, groups: Sequence[Group], found: Findings, peers: Comparisons) -> str:
     """The page, whose head is kept.
 
     Args:
         head: The page as it is, or what is to stand above the mark.
         groups: The rows.
         found: What was found for them.
+        peers: The same problems in several programs.
     """
     parts = [head.split(MARK)[0] + MARK, _summary(groups, found), f"![Errors of all rows]({FIGURE})", _CAPTION]
     for group in groups:
         parts += [f"## {group.title}", group.text] if group.text else [f"## {group.title}"]
         parts.append(_HEAD + "".join(_line(row, key, found.results.get(key)) for key, row in keyed([group])))
+    if peers.problems:
+        parts += ["## Beside other programs", _PEERS, peers.section()]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 

@@ -19,6 +19,10 @@
 #
 # **Cycles.**  A bond that was opened to $2\varepsilon$ and is then led round a closed path below that opening, 20
 # times, spends nothing more.
+#
+# **An inclined joint.**  A square of 1 m, $E$ = 30 GPa, $\nu$ = 0.2, is crossed at 45° by an elastic joint of 20 MPa/mm
+# across and 40 MPa/mm along it, and drawn by $\sigma$ (Code_Aster V3.04.001).  The joint carries $\sigma/2$ both ways
+# and opens by $\frac{\sigma}{2\sqrt 2}\,(1/k_n + 1/k_t)$ along the pull, and by the difference of both across it.
 
 from math import exp
 from pathlib import Path
@@ -28,10 +32,23 @@ from _problems import solve
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
-from cutsim import Exponential, LinearElastic, Mechanics, State, Support, Tolerances, cracked_space
+from cutsim import (
+    Bilinear,
+    Crack,
+    Exponential,
+    LinearElastic,
+    Mechanics,
+    Solid,
+    State,
+    Support,
+    Tolerances,
+    Traction,
+    cracked_space,
+)
 from cutsim.analysis.stepping import begin
 from helpers.blocks import Blocks, drag
 from helpers.laws import BILINEAR, EXPONENTIAL
+from helpers.runs import final
 
 DATA = Path(__file__).parents[1] / "data"
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu"}
@@ -116,7 +133,33 @@ def cycles(quick: bool) -> dict[str, float]:
     return {"spent": float((spent[-1] - spent[first_cycle]) / spent[first_cycle])}
 
 
-PROBLEMS = {"boxes": boxes, "paths": paths, "mixed": mixed, "cycles": cycles}
+# ## Joint
+
+
+def joint(quick: bool) -> dict[str, float]:
+    """Displacements of the drawn side and of the free one over the closed forms."""
+    side, young, poisson, pull, across, along = 1000.0, 30e3, 0.2, 1.0, 20.0, 40.0
+    domain = mesh.create_rectangle(MPI.COMM_SELF, [(0.0, 0.0), (side, side)], (4, 4), mesh.CellType.triangle)
+    bonded = mesh.locate_entities(domain, 1, lambda x: np.isclose(x[0], x[1]))
+    state = State(cracked_space(domain, ("Lagrange", 1, (2,)), bonded))
+    left, low, right, high = (
+        mesh.locate_entities_boundary(domain, 1, lambda x, axis=axis, end=end: np.isclose(x[axis], end))
+        for axis, end in ((0, 0.0), (1, 0.0), (0, side), (1, side))
+    )
+    law = Bilinear(across, 1e6, 1e12, 1e6, 1e12, shear_penalty=along)  # as strong as to stay intact
+    crack = Crack(state, bonded, (1.0, -1.0), law, young=young, normal="reference")
+    solid = Solid(state, LinearElastic(young, poisson), plane="stress")
+    load = Traction(state, right, (pull, 0.0), lambda t: t)
+    final(Mechanics(state, [solid, crack, load], [Support(state, left, 0), Support(state, low, 1)]), step=1.0)
+    jump = pull / (2 * np.sqrt(2)) * np.array([1 / across + 1 / along, 1 / across - 1 / along])
+    expected = (pull / young * side + jump[0], jump[1] - poisson * pull / young * side)
+    u = state.u.x.array.reshape(-1, 2)
+    ends = (u[fem.locate_dofs_topological(state.V, 1, facets)] for facets in (right, high))
+    found = [float(end[:, axis].max()) for axis, end in enumerate(ends)]
+    return {"drawn": found[0] / expected[0], "free": found[1] / expected[1]}
+
+
+PROBLEMS = {"boxes": boxes, "paths": paths, "mixed": mixed, "cycles": cycles, "joint": joint}
 
 if __name__ == "__main__":
     solve("bonds", PROBLEMS)

@@ -254,6 +254,16 @@ class Lines:
     slide: float = 0.0  # [mm]
     steps: tuple[int, int] = (10, 10)  # down, sideways
 
+    def mesh(self, comm: MPI.Comm = COMM) -> TaggedMesh:
+        """Mesh of both bodies."""
+        shape = dict(R=self.radius, R_lower=self.lower_radius, band=self.band, lc=self.size, lc_far=self.far)
+        return read_geo(geometry("cylinders"), comm, shape, gdim=2)
+
+    @property
+    def contact(self) -> PenaltyContact:
+        """Contact law, by the softer body."""
+        return PenaltyContact.automatic(min(self.upper.young, self.lower.young), self.size)
+
     @property
     def modulus(self) -> float:
         """E* [MPa]."""
@@ -286,7 +296,14 @@ CYLINDER = Lines(
     LinearElastic(210e3, 0.3), LinearElastic(70e3, 0.3), 50.0, 0.0, 0.1,
     band=9.0, size=0.25, far=15.0, approach=1.547, steps=(10, 0),
 )  # fmt: skip
-TITLES = {"mindlin": "Two cylinders drawn sideways", "cylinder": "NAFEMS CGS-1, cylinder on a block"}
+# The same without friction, and under smaller and smaller loads: what is left of the distance from Hertz's theory is
+# neither friction between unlike bodies nor the size of the contact.
+SMOOTH = {
+    "smooth_1": replace(CYLINDER, friction=0.0),
+    "smooth_2": replace(CYLINDER, friction=0.0, approach=CYLINDER.approach / 4, size=0.125, band=5.4),
+    "smooth_3": replace(CYLINDER, friction=0.0, approach=CYLINDER.approach / 16, size=0.0625, band=2.7),
+}
+TITLES = {"mindlin": "Two cylinders drawn sideways", "cylinder_4": "NAFEMS CGS-1, cylinder on a block"}
 
 
 @dataclass(frozen=True)
@@ -300,8 +317,7 @@ class LineContact:
     @classmethod
     def build(cls, lines: Lines, comm: MPI.Comm = COMM) -> "LineContact":
         """Mesh the bodies and put the terms together."""
-        shape = dict(R=lines.radius, R_lower=lines.lower_radius, band=lines.band, lc=lines.size, lc_far=lines.far)
-        domain = read_geo(geometry("cylinders"), comm, shape, gdim=2)
+        domain = lines.mesh(comm)
         state = State(fem.functionspace(domain.mesh, ("Lagrange", 2, (2,))))
         solids = [
             Solid(state, material, cells=domain.cells(name), name=name)
@@ -310,8 +326,8 @@ class LineContact:
         young = min(lines.upper.young, lines.lower.young)
         facets = [domain.facets(f"contact_{name}") for name in ("upper", "lower")]
         pair = SurfacePair(
-            state, *facets, young=young, contact=PenaltyContact.automatic(young, lines.size),
-            friction=Coulomb(lines.friction), search=0.2 * lines.band,
+            state, *facets, young=young, contact=lines.contact,
+            friction=Coulomb(lines.friction) if lines.friction else None, search=0.2 * lines.band,
         )  # fmt: skip
         top, down = domain.facets("top"), float(lines.steps[0])
         supports = [Support(state, domain.facets("bottom"), i) for i in range(2)]
@@ -332,8 +348,8 @@ class LineContact:
         """Reference position along the contact, pressure and shear at the points of this rank. Collective."""
         first = self.pair.passes[0]
         place = first.points.evaluator({"x": ufl.SpatialCoordinate(self.pair.state.mesh)[0]})()["x"]
-        assert first.slip is not None
-        return place, first.history.trial["pressure"], first.slip.values("traction").reshape(place.shape)
+        shear = np.zeros(place.shape) if first.slip is None else first.slip.values("traction").reshape(place.shape)
+        return place, first.history.trial["pressure"], shear
 
     def tractions(self) -> dict[str, np.ndarray]:
         """The same of all ranks, from left to right, by name. Collective."""
@@ -347,12 +363,16 @@ class LineContact:
         load, tangential = -last["down_force"], abs(last["side_force"])
         shear = np.abs(self.tractions()["shear"])
         x, pressure, _ = self.at_points()
-        means = points.facet_mean(pressure)
+        half_width = 2 * float(np.sqrt(points.integral(pressure * x**2) / points.integral(pressure)))
+        peak = points.maximum(points.facet_mean(pressure)[:, None])
         result = {
             "load": load,
-            "half_width": 2 * float(np.sqrt(points.integral(pressure * x**2) / points.integral(pressure))),
+            "half_width": half_width,
             "half_width_of_theory": lines.half_width(load),
-            "peak_pressure": points.maximum(means[:, None]),
+            "width_over_theory": half_width / lines.half_width(load),
+            "peak_over_theory": peak / lines.peak(load),
+            "width_over_radius": half_width / lines.radius,
+            "peak_pressure": peak,
             "peak_pressure_of_theory": lines.peak(load),
             "element": lines.size,
             "energy_closure": abs(last["energy_closure"]),
@@ -498,11 +518,18 @@ def main(
             compare(specimen, histories, out / name, elastic=name == "elastic")
     thesis = Indentation.rigid(replace(specimen, material=THESIS), meshes["rigid"][1])
     results["thesis"] = thesis.result(indent(thesis))
-    for name, lines in (("mindlin", MINDLIN), ("cylinder", CYLINDER)):
-        contact = LineContact.build(replace(lines, size=1.6 * lines.size) if quick else lines)
+    lines = {"mindlin": MINDLIN, "cylinder": CYLINDER}
+    if not quick:
+        fine = {f"cylinder_{n}": replace(CYLINDER, size=0.5 / n) for n in (1, 2, 4)}
+        lines = {"mindlin_coarse": replace(MINDLIN, size=2 * MINDLIN.size), "mindlin": MINDLIN, **fine, **SMOOTH}
+    for name, problem in lines.items():
+        contact = LineContact.build(replace(problem, size=1.6 * problem.size) if quick else problem)
         last = contact.run()
         results[name] = contact.result(last)
-        profile(contact, last, out / f"{name}.png", TITLES[name])
+        if name in TITLES:
+            profile(contact, last, out / f"{name}.png", TITLES[name])
+    if not quick:
+        results["cylinder"] = results["cylinder_4"]
     write_summary(out / "summary.json", results, COMM)
     if COMM.rank == 0:
         for name, result in results.items():

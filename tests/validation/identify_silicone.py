@@ -12,7 +12,6 @@
 import csv
 import logging
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +22,7 @@ from scipy.optimize import root_scalar
 
 from cutsim import (
     Blade,
+    CohesiveLaw,
     Drive,
     Exponential,
     Insertion,
@@ -122,16 +122,15 @@ HALF_ANGLE, HALF_THICKNESS = float(np.arctan2(0.855, 4.2)), 0.855
 
 
 def cut(
-    domain: TaggedMesh, specimen: Specimen, solid: NeoHookean, strength: float, values: dict[str, float]
+    domain: TaggedMesh, specimen: Specimen, solid: NeoHookean, bond: CohesiveLaw, friction: float, degree: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
     """Depth and force per width [N/mm] while the blade is pushed."""
-    bond = Exponential(strength=strength, toughness=values["toughness"])
     problem = Insertion.build(
-        cracked_block(domain, solid, bond, viscosity=0.002),
+        cracked_block(domain, solid, bond, viscosity=0.002, degree=degree),
         Blade(HALF_ANGLE, specimen.radius, HALF_THICKNESS),
         Drive(speed=1.0, entry_time=1.0),
         notch=specimen.notch,
-        friction=values["friction"],
+        friction=friction,
     )
     rows = []
     control = StepControl(first=specimen.step, largest=specimen.step, smallest=1e-4)
@@ -145,7 +144,11 @@ def inverse(quick: bool, out: Path) -> Fit:
     """Toughness and friction of a known cut from its curve."""
     specimen, solid = TALL[quick], NeoHookean(0.777, 0.45)
     domain = read_geo(MESH, COMM, specimen.mesh, gdim=2)
-    simulate = partial(cut, domain, specimen, solid, 0.4)
+
+    def simulate(values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        bond = Exponential(strength=0.4, toughness=values["toughness"])
+        return cut(domain, specimen, solid, bond, values["friction"])
+
     depth, force = simulate(TRUE)
     x = np.linspace(depth[0], depth[-1], 60)
     noise = np.random.default_rng(0).standard_normal(60)
@@ -188,8 +191,8 @@ def toughness_of(number: int, specimen: Specimen, domain: TaggedMesh) -> tuple[d
     curves: dict[float, tuple[np.ndarray, np.ndarray]] = {}
 
     def largest(toughness: float) -> float:
-        values = {"toughness": toughness, "friction": FRICTION[number]}
-        depth, force = cut(domain, specimen, record.material, record.strength, values)
+        bond = Exponential(strength=record.strength, toughness=toughness)
+        depth, force = cut(domain, specimen, record.material, bond, FRICTION[number])
         curves[toughness] = depth, WIDTH * force
         return float(curves[toughness][1].max())
 

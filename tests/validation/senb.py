@@ -319,6 +319,8 @@ def main(
     recording, peak = propagation(int(dim), quick, out, summary["notch"][-1])
     summary |= peak
     if dim == "2" and not quick:
+        coarse = {**STATIONARY[2], "lc": 2 * STATIONARY[2]["lc"]}
+        summary["coarse"] = [fracture_parameters(row["notch_over_height"], coarse) for row in summary["notch"]]
         summary |= size_effect(summary["peak_load_per_thickness"], out)
     recording.summary(summary)
 

@@ -1,16 +1,19 @@
-"""The two cubes of bench_sliding.py in GetFEM: same meshes, energy, supports and steps; contact without penalty.
+"""The two cubes of `cubes` in GetFEM: same meshes, energy, supports and steps; contact without penalty.
 
-Needs GetFEM's Python interface (the Debian package python3-getfem; run with the system's Python).  Prints the forces on
-both cubes: with `--version 0`, GetFEM's default, they differ once facets hang over an edge.
+Needs GetFEM's Python interface (the Debian package python3-getfem; run with the system's Python).  The last line is
+what was found. Forces on both cubes go to the error stream: with `--version 0`, GetFEM's default, they differ once
+facets hang over an edge.
 """
 
 import argparse
+import json
+import sys
+import time
 
 import getfem as gf
 import numpy as np
+from cubes import CELLS, DRAW, EDGE, FRICTION, POISSON, PRESS, STEPS, YOUNG
 
-EDGE, PRESS, DRAW, YOUNG, POISSON, FRICTION = 10.0, 1.0, 3.0, 1.0, 0.45, 0.3
-STEPS = 5, 15
 BOTTOM, TOP = 1, 2
 
 
@@ -65,10 +68,10 @@ def touch(model: gf.Model, slave: tuple[Cube, int], master: tuple[Cube, int], st
 
 
 def main() -> None:
-    """Print the forces at the end of each step."""
+    """Print what was found, and the forces at the end of each step."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("upper", type=int, nargs="?", default=12)
-    parser.add_argument("lower", type=int, nargs="?", default=10)
+    parser.add_argument("upper", type=int, nargs="?", default=CELLS[0])
+    parser.add_argument("lower", type=int, nargs="?", default=CELLS[1])
     parser.add_argument("--below", action="store_true", help="slave surface below")
     parser.add_argument("--version", type=int, default=1, help="1: symmetric, 0: GetFEM's default")
     parser.add_argument("--stiffness", type=float, default=10.0, help="of the augmentation, r in N/mm³")
@@ -79,14 +82,25 @@ def main() -> None:
     touch(model, *(surfaces[::-1] if options.below else surfaces), options.stiffness, options.version)
     upper.support(TOP)
     lower.support(BOTTOM)
-    total = 0
+    total, normal, start = 0, [], time.process_time()
     for step in range(1, sum(STEPS) + 1):
         press, draw = min(step / STEPS[0], 1.0), max(step - STEPS[0], 0) / STEPS[1]
         model.set_variable("upper_path", [DRAW * draw, 0.0, -PRESS * press])
         for cube in (upper, lower):
             model.set_variable(f"{cube.name}_old", model.variable(cube.name))
         total += model.solve("max_iter", 60, "max_res", 1e-9, "lsearch", "simplest", "alpha min", 0.2)[0]
-        print(f"{step:3d} {total:4d} iterations; upper {upper.force().round(4)}, lower {lower.force().round(4)} N")
+        forces = f"upper {upper.force().round(4)}, lower {lower.force().round(4)} N"
+        print(f"{step:3d} {total:4d} iterations; {forces}", file=sys.stderr)
+        normal.append(upper.force()[2])
+    values = {
+        "normal force, pressed": normal[STEPS[0] - 1],
+        "drag at the end": -upper.force()[0],
+        "normal force at the end": normal[-1],
+    }
+    seconds = time.process_time() - start
+    unknowns = upper.space.nbdof() + lower.space.nbdof()
+    found = {"values": values, "iterations": total, "seconds": seconds, "unknowns": unknowns}
+    print(json.dumps(found | {"version": gf.getfem_env("version")}))
 
 
 if __name__ == "__main__":
