@@ -1,5 +1,7 @@
 // Macros for the geometries of this folder; no geometry by itself.
 
+behind = 0; // how far a body in space goes on behind z = 0
+
 // Layers of an extrusion that start with the size `size`, grow by the ratio `growth` up to the size `largest` and are
 // then shrunk together to fill `length`. Result: the lists of Layers{layers[], ends[]}.
 Macro Graded
@@ -74,7 +76,7 @@ Return
 // Physical group `name` of all cells with x and y in box[] = {x_min, x_max, y_min, y_max}.
 Macro Cells
   If (dim == 3)
-    Physical Volume(Str(name)) = Volume In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, depth + e};
+    Physical Volume(Str(name)) = Volume In BoundingBox{box[0] - e, box[2] - e, -behind - e, box[1] + e, box[3] + e, depth + e};
   Else
     Physical Surface(Str(name)) = Surface In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, e};
   EndIf
@@ -83,7 +85,7 @@ Return
 // Physical group `name` of all facets with x and y in box[]. One side of the box must be thin.
 Macro Facets
   If (dim == 3)
-    Physical Surface(Str(name)) = Surface In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, depth + e};
+    Physical Surface(Str(name)) = Surface In BoundingBox{box[0] - e, box[2] - e, -behind - e, box[1] + e, box[3] + e, depth + e};
   Else
     Physical Curve(Str(name)) = Curve In BoundingBox{box[0] - e, box[2] - e, -e, box[1] + e, box[3] + e, e};
   EndIf

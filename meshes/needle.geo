@@ -1,4 +1,4 @@
-// Half of a block that a needle splits, in front of the plane z = 0; the needle's axis is y. Lengths in mm, hexahedra.
+// Block that a needle splits, or its half in front of the plane z = 0; the needle's axis is y. Lengths in mm, hexahedra.
 //
 //        top_left  | top_right   y = 0      y  the needle moves along -y
 //      +-----------:-----------+            |
@@ -8,13 +8,15 @@
 //      +-----------+-----------+  y = -H
 //     -L         bottom        L
 //
-// The plane x = 0 is the crack, but for the notch 0 < z < slit, -notch < y < 0. Faces "symmetry" (z = 0), "back" (z = B).
+// The plane x = 0 is the crack, but for the notch |z| < slit, -notch < y < 0. Faces "symmetry" (z = 0), "back" (z = B);
+// with whole = 1 "front" (z = -B) in place of the first, for a needle whose two halves along the crack differ.
 // With notch = 0 there is no facet "notch", and `slit` is the half width of the fine part.
 // Sizes: lc down to `deep`, out to `band` and along z to `slit`, growing from there.
 Include "common.geo";
 DefineConstant[
   L      = {12,  Name "L"},       // length of each half
   B      = {10,  Name "B"},       // half the width
+  whole  = {0,   Name "whole"},   // 1: with the half behind z = 0
   H      = {10,  Name "H"},       // height
   notch  = {1,   Name "notch"},   // depth of the starting notch
   slit   = {1.4, Name "slit"},    // half its width
@@ -31,6 +33,7 @@ If (notch < 0 || notch >= deep || deep >= H)
   Error("notch = %g must lie in [0, deep = %g), deep in (0, H = %g)", notch, deep, H);
 EndIf
 
+both = whole; // macros have a variable of this name
 mouth = entry; // of the crack, if there is no notch
 lines[] = {};
 foot = 1;
@@ -59,17 +62,21 @@ For side In {-1:1:2}
 EndFor
 
 sections[] = Surface{:};
-length = slit;
-fine = slit;
-Call FromMouth;
-near[] = Extrude {0, 0, slit} { Surface{sections[]}; Layers{layers[], ends[]}; Recombine; };
-size = growth * lc;
-largest = B;
-length = B - slit;
-Call Graded;
-Extrude {0, 0, length} { Surface{near[{0:#near[] - 1:6}]}; Layers{layers[], ends[]}; Recombine; }
+For half In {0:both}
+  way = 1 - 2 * half;
+  length = slit;
+  fine = slit;
+  Call FromMouth;
+  far[] = Extrude {0, 0, way * slit} { Surface{sections[]}; Layers{layers[], ends[]}; Recombine; };
+  size = growth * lc;
+  largest = B;
+  length = B - slit;
+  Call Graded;
+  Extrude {0, 0, way * length} { Surface{far[{0:#far[] - 1:6}]}; Layers{layers[], ends[]}; Recombine; }
+EndFor
 
 depth = B;
+behind = both * B;
 dim = 3;
 e = 1e-6 * H;
 name = "left";      box[] = {-L, 0, -H, 0};  Call Cells;
@@ -77,10 +84,13 @@ name = "right";     box[] = {0, L, -H, 0};   Call Cells;
 name = "top_left";  box[] = {-L, 0, 0, 0};   Call Facets;
 name = "top_right"; box[] = {0, L, 0, 0};    Call Facets;
 name = "bottom";    box[] = {-L, L, -H, -H}; Call Facets;
-name = "symmetry";                           Call Ends;
-plane[] = Surface In BoundingBox{-e, -H - e, -e, e, e, B + e};
+If (both)
+  sections[] = Surface In BoundingBox{-L - e, -H - e, -B - e, L + e, e, -B + e};
+EndIf
+name = StrChoice(both, "front", "symmetry"); Call Ends;
+plane[] = Surface In BoundingBox{-e, -H - e, -behind - e, e, e, B + e};
 If (notch > 0)
-  notched[] = Surface In BoundingBox{-e, -notch - e, -e, e, e, slit + e};
+  notched[] = Surface In BoundingBox{-e, -notch - e, -both * slit - e, e, e, slit + e};
   plane[] -= notched[];
   Physical Surface("notch") = notched[];
 EndIf

@@ -228,6 +228,12 @@ def test_surfaces_that_cannot_be(written, surfaces, words):
         read_case(written(CUT.replace("SURFACES", surfaces))).build(COMM)
 
 
+def test_faces_that_slide_leave_their_friction_to_a_pair(written):
+    text = CUT.replace("SURFACES", "automatic = true").replace("closing = false", "closing = false\nfriction = 0.3")
+    with pytest.raises(CaseError, match=r"crack.friction: 0.3: must be left out with closing=false"):
+        read_case(written(text)).build(COMM)
+
+
 def test_heat_flows_through_a_strip(written):
     text = (STRIP + HEAT).replace("until = 1\n", "until = 1e6\n").replace("fixed = 0.5", "fixed = 1e6")
     row, _ = last(read_case(written(text)).build(COMM))

@@ -193,6 +193,27 @@ def test_bevel_needle_is_an_oblique_cylinder_with_a_rounded_edge():
     np.testing.assert_allclose(np.linalg.norm(gradient[near], axis=1), 1, atol=1e-8)
 
 
+def test_half_a_bevel_needle_goes_on_without_end():
+    whole, half = (BevelNeedle(0.45, 0.8, 0.12, side=side) for side in (0, 1))
+    normal = np.array(half.normal)
+    assert normal == pytest.approx((0, -1, 0))
+    points = np.random.default_rng(6).uniform((-1, -1, -0.2), (1, 1, 4), (80, 3))
+    ahead = points + np.maximum(0, -points @ normal)[:, None] * normal
+    np.testing.assert_allclose(values(half, points)[0], values(whole, ahead)[0], atol=1e-9)
+    assert (points @ normal < -0.1).sum() > 20
+
+
+def test_half_the_width_of_a_bevel_needle_is_that_of_its_section():
+    needle = BevelNeedle(0.45, 0.8, 0.12)
+    u, v = (x.ravel() for x in np.meshgrid(np.linspace(-0.8, 0.8, 81), np.linspace(0, 0.8, 81)))
+    # that of a needle with a sharp edge, which is wider near the tip and never narrower
+    for height, rounded in ((0.3, 0.2), (1.0, 0.1), (2.0, 0.021), (needle.shaft_height, 0.021), (4.0, 0.021)):
+        inside = values(needle, np.column_stack([u, v, 0 * u + height]))[0] < 0
+        widest = v[inside].max()
+        assert widest - 1e-9 <= needle.half_width(height) <= widest + rounded
+    assert needle.half_width(needle.shaft_height) == pytest.approx(0.8)
+
+
 def test_blade_with_ends_is_a_rounded_prism():
     blade = Blade(HALF, R, SHANK, (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), edge_length=1.4)
     s, c = np.sin(HALF), np.cos(HALF)

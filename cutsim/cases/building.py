@@ -23,7 +23,7 @@ from cutsim.cases.domains import Domain
 from cutsim.cases.heating import coupled, temperature
 from cutsim.cases.holding import loads, supports
 from cutsim.cases.insertions import inserted
-from cutsim.cases.interfaces import crack_friction, cracks, pairs
+from cutsim.cases.interfaces import cracks, pairs
 from cutsim.cases.measures import columns_of, measures, tool_measures
 from cutsim.cases.parts import Parts
 from cutsim.cases.refusals import refused, refusing
@@ -151,11 +151,10 @@ def _general(domain: Domain) -> Simulation:
     state = domain.state()
     value = temperature(domain, state, domain.split)
     bodies = solids(domain, state, value)
-    faces = cracks(domain, bodies)
-    rubbing = {friction.crack.name: friction for friction in crack_friction(domain, faces, value)}
+    faces = cracks(domain, bodies, value)
     joined, rigid = pairs(domain, bodies, faces, value), tools(domain, bodies, faces, value)
-    parts = Parts(bodies, faces, rubbing, joined, {name: [tool] for name, tool in rigid.items()})
-    touching = [*faces.values(), *rubbing.values(), *joined.values(), *rigid.values()]
+    parts = Parts(bodies, faces, joined, {name: [tool] for name, tool in rigid.items()})
+    touching = [*faces.values(), *joined.values(), *rigid.values()]
     terms = [*bodies, *touching, *links(domain, state, faces), *loads(domain, state, bodies)]
     held = supports(domain, state, faces)
     with refusing(domain.document):

@@ -98,7 +98,7 @@ def _exchanges(domain: Domain, heat: schema.Heat, parts: Parts, value: Temperatu
         law = heat.cracks.get(name, _FACES if crack.law is not None else None)
         if law is not None:
             with refusing(domain.document, "heat", "cracks", name):
-                yield InterfaceHeat(value, crack, law, parts.rubbing.get(name))
+                yield InterfaceHeat(value, crack, law, crack.friction)
     for name, exchange in heat.pairs.items():
         with refusing(domain.document, "heat", "pairs", name):
             yield PairHeat(value, parts.pairs[name], exchange)

@@ -15,7 +15,7 @@ from cutsim.fields.temperature import Temperature
 from cutsim.studies.body import CrackedBody, cracked_state
 from cutsim.studies.insertion import Insertion
 from cutsim.studies.layered import Layer, LayeredBlock
-from cutsim.tools.pointed import Pointed
+from cutsim.tools.insertable import Insertable
 
 _KEY = "insertion"
 
@@ -36,10 +36,10 @@ def inserted(domain: Domain, mechanics: Mapping[str, Any]) -> tuple[Insertion, T
     body, value = _layered(domain) if domain.tables.layers else _cracked(domain)
     tool = domain.tables.tools[table.tool]
     shape = tool.made
-    if not isinstance(shape, Pointed):
+    if not isinstance(shape, Insertable):
         raise refused(domain.document, ("tools", table.tool, "shape"), "must be a blade or a needle, to be inserted")
     drive = None if table.machine is None else machine(domain, (_KEY, "machine"), table.machine)
-    with refusing(domain.document, _KEY):
+    with refusing(domain.document, _KEY, elsewhere={"tool": ("tools", table.tool), "drive": (_KEY,)}):
         cut = Insertion.build(
             body,
             shape,

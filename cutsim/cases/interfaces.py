@@ -1,6 +1,6 @@
 """Cracks and pairs of surfaces of a case."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -14,7 +14,6 @@ from cutsim.cases.refusals import refusing
 from cutsim.fields.faces import Face
 from cutsim.fields.temperature import Temperature
 from cutsim.interface.crack import Crack
-from cutsim.interface.crack_friction import CrackFriction
 from cutsim.interface.rubbing import Friction
 from cutsim.pairs.contact_surfaces import ContactSurfaces
 from cutsim.pairs.surface_pair import SurfacePair
@@ -22,16 +21,19 @@ from cutsim.pairs.surface_pair import SurfacePair
 _SIDES: tuple[Literal["+", "-"], ...] = ("+", "-")
 
 
-def cracks(domain: Domain, solids: tuple[Solid, ...]) -> dict[str, Crack]:
-    """Cracks of a case by name. Collective.
+def cracks(domain: Domain, solids: tuple[Solid, ...], temperature: Temperature | None) -> dict[str, Crack]:
+    """Cracks of a case by name, with their friction. Collective.
 
     Raises:
         CaseError: A group is missing, or a crack refuses a parameter.
     """
-    return {name: _crack(domain, solids, name, table) for name, table in domain.tables.cracks.items()}
+    tables = domain.tables.cracks.items()
+    return {name: _crack(domain, solids, name, table, temperature) for name, table in tables}
 
 
-def _crack(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.Crack) -> Crack:
+def _crack(
+    domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.Crack, temperature: Temperature | None
+) -> Crack:
     key = ("cracks", name)
     facets = domain.facets((*key, "facets"), table.facets)
     plus = domain.cells((*key, "plus"), [table.plus]) if isinstance(table.plus, str) else table.plus
@@ -44,21 +46,11 @@ def _crack(domain: Domain, solids: tuple[Solid, ...], name: str, table: schema.C
             young=table.young or softest(solids, facets),
             name=name,
             contact=table.contact,
+            friction=friction_of(table, temperature),
             allowed_penetration=table.allowed_penetration,
             normal=table.normal,
             closing=table.closing,
         )
-
-
-def crack_friction(
-    domain: Domain, cracks: dict[str, Crack], temperature: Temperature | None
-) -> Iterator[CrackFriction]:
-    """Friction of the cracks that have it, as terms of their own. Collective."""
-    for name, table in domain.tables.cracks.items():
-        with refusing(domain.document, "cracks", name):
-            friction = friction_of(table, temperature)
-            if friction is not None:
-                yield CrackFriction(cracks[name], friction)
 
 
 def friction_of(table: schema.Interface | schema.Tool, temperature: Temperature | None) -> Friction | None:

@@ -1,5 +1,6 @@
 """What is wrong with a case file, in plain words, from what pydantic finds."""
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -79,8 +80,14 @@ def refusal(refused: Refused, keys: Keys, node: Any, document: Document) -> str:
             hint = (
                 next(filter(None, (_named((*keys[:-1], inner), node) for inner in node)), "") if value is None else ""
             )
-        return document.problem(keys, f"must be {refused.allowed.removesuffix(' or None')}{hint}", value)
-    return document.problem(keys, f"{name} = {value!r} must be {refused.allowed}")
+        return document.problem(keys, f"must be {_as_in_file(refused.allowed)}{hint}", value)
+    return document.problem(keys, f"{name} = {value!r} must be {_as_in_file(refused.allowed)}")
+
+
+def _as_in_file(allowed: str) -> str:
+    """What a constructor allows, in the words of a file, which has no None and writes true and false."""
+    words = re.sub(r"^None\b", "left out", allowed.removesuffix(" or None").removesuffix(", or None"))
+    return re.sub(r"\b(True|False)\b", lambda found: found[0].lower(), words)
 
 
 def _about_key(keys: Keys, document: Document, scope: Scope) -> str:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 from cutsim.bodies.solid import Solid
 from cutsim.interface.crack import Crack
-from cutsim.interface.crack_friction import CrackFriction
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.tools.rigid_tool import RigidTool
 
@@ -17,13 +16,11 @@ class Parts:
     Attributes:
         solids: The bodies.
         cracks: The cracks.
-        rubbing: Friction of those cracks that have it as a term of its own.
         pairs: Pairs of surfaces.
         tools: The tools, each as it meets the body: an inserted one is one term for each face of the crack.
     """
 
     solids: tuple[Solid, ...]
     cracks: Mapping[str, Crack] = field(default_factory=dict)
-    rubbing: Mapping[str, CrackFriction] = field(default_factory=dict)
     pairs: Mapping[str, SurfacePair] = field(default_factory=dict)
     tools: Mapping[str, Sequence[RigidTool]] = field(default_factory=dict)

@@ -15,7 +15,7 @@ from cutsim.cases.schema_rigs import Machines, Place
 from cutsim.cases.tables import FORM, NONNEGATIVE, POSITIVE, Flag, Table, Varying, chosen_by
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
-from cutsim.tools.pointed import Pointed
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.shapes import Shape
 
 Volumetric = Literal["auto", "full", "reduced", "mixed", "taylor-hood"]
@@ -202,7 +202,7 @@ class Tool(Moved, Constructed):
     @property
     def pointed(self) -> bool:
         """Whether it can be inserted."""
-        return isinstance(self._made, Pointed)
+        return isinstance(self._made, Insertable)
 
 
 class SurfaceTool(Tool):

@@ -24,7 +24,7 @@ from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
 from cutsim.tools.carriage import Carriage
-from cutsim.tools.pointed import Pointed
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.shapes import ToolPath
 from cutsim.tools.tool_contact import ToolContact
@@ -133,7 +133,7 @@ def _contact(shape: object, solids: tuple[Solid, ...], surfaces: list[Surface]) 
     points = [surface.points for surface in surfaces]
     young = min(softest(solids, p.facets) for p in points)
     h = min(p.mean(normal_size(solids[0].state.mesh, p.facets)) for p in points)
-    return shape.contact(young, h) if isinstance(shape, Pointed) else PenaltyContact.automatic(young, h)
+    return shape.contact(young, h) if isinstance(shape, Insertable) else PenaltyContact.automatic(young, h)
 
 
 def path_of(table: schema.Moved) -> ToolPath:

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from cutsim.base.arrays import Array
 from cutsim.base.compat import nodal_expression
 from cutsim.results.grids import library
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.pointed import Pointed
 from cutsim.tools.rigid_tool import RigidTool
 from cutsim.tools.tool_contact import ToolContact
@@ -120,8 +121,8 @@ class Pose:
 class ToolSurfaces:
     """Surfaces of the rigid tools of a problem where they are at the time, as far as they are near the body.
 
-    Blades and needles are drawn from their outline, triangulations as they are, and every other shape from its signed
-    distance.
+    Blades and conical needles are drawn from their outline, triangulations as they are, and every other shape from its
+    signed distance.
 
     Args:
         terms: Terms of the problem; those that are no tools are left out.
@@ -135,7 +136,7 @@ class ToolSurfaces:
                 self._others.append(_Triangulated(tool))
             elif isinstance(tool, ToolContact) and isinstance(tool.shape, Pointed):
                 self._pointed.append((tool.shape, tool))
-            elif isinstance(tool, ToolContact):
+            elif isinstance(tool, ToolContact) and getattr(tool.shape, "side", 0) >= 0:  # two halves are drawn as one
                 self._others.append(_Level(tool))
 
     def __call__(self, bounds: Sequence[float]) -> pyvista.PolyData | None:
@@ -202,7 +203,8 @@ class _Level:
             [self._corner[i] + self._size[i] * x[i] for i in range(gdim)]
         )
         self._distance = fem.Function(fem.functionspace(domain, ("Lagrange", 1)))
-        self._expression = nodal_expression(tool.shape.distance(place), self._distance.function_space)
+        shape = replace(tool.shape, side=0) if isinstance(tool.shape, Insertable) else tool.shape  # type: ignore[type-var]
+        self._expression = nodal_expression(shape.distance(place), self._distance.function_space)
 
     def __call__(self, box: Array) -> Any:
         pyvista, position = library("no tool is drawn"), self._tool.position.value
@@ -216,7 +218,8 @@ class _Level:
         flat = np.arange(3) >= gdim
         grid = pyvista.UnstructuredGrid(cells, kinds, np.where(flat, 0.0, box[0]) + points * np.where(flat, 0.0, size))
         grid["distance"] = self._distance.x.array
-        return grid.clip_scalar(scalars="distance", value=0.0).extract_surface(algorithm="dataset_surface")
+        # VTK's other algorithm crashes where the clip leaves a cell without volume
+        return grid.clip_scalar(scalars="distance", value=0.0).extract_surface(algorithm="geometry")
 
 
 class _Triangulated:
@@ -251,7 +254,7 @@ def front(terms: Iterable[Any]) -> dict[str, tuple[float, ...]]:
     for tool in terms:
         push = getattr(tool.shape, "push", None) if isinstance(tool, ToolContact) else None
         if push is not None:
-            right = getattr(tool.shape, "lateral", None) or np.cross(push, np.eye(3)[int(np.abs(push).argmin())])
+            right = getattr(tool.shape, "normal", None) or np.cross(push, np.eye(3)[int(np.abs(push).argmin())])
             right, push = (tool.rotation.value @ np.asarray(v) for v in (right, push))
             return {"right": tuple(map(float, right)), "up": tuple(-float(p) for p in push)}
     return {}

@@ -14,7 +14,7 @@ from cutsim.base.signatures import checked
 from cutsim.base.units import Length, Number, Time, Velocity
 from cutsim.bodies.machine import Machine
 from cutsim.studies.frame import Frame
-from cutsim.tools.pointed import Pointed
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.shapes import ToolPath
 
 #: Depth of the tip, as a part of the depth of the notch, when the push begins.
@@ -86,14 +86,14 @@ class Motion:
     dwell: float = 0.0
 
     @classmethod
-    def of(cls, drive: Drive, tool: Pointed, notch: float, reach: float) -> "Motion":
+    def of(cls, drive: Drive, tool: Insertable, notch: float, reach: float) -> "Motion":
         """The motion of a tool in a body with a notch, or without one, above a depth.
 
         Raises:
             ValueError: The tool is to turn before the push begins, or below the body.
         """
         start_depth = TIP_IN_NOTCH * notch
-        start_height = start_depth or tool.tip_radius
+        start_height = start_depth or tool.resolution
         if drive.turning_depth is not None:
             require_number("turning_depth", drive.turning_depth, above(start_depth, "the start of the push"))
             require_number("turning_depth", drive.turning_depth, between(0, reach, name="the height of the body"))
@@ -172,7 +172,7 @@ class Motion:
         start = self.start_depth if halves else -np.inf
         return ToolPath(lambda time: frame.point(max(self.depth(time), start)), self.corners)
 
-    def path(self, frame: Frame, tool: Pointed) -> ToolPath:
+    def path(self, frame: Frame, tool: Insertable) -> ToolPath:
         """ToolPath of a tool, or of a half of it, in a frame."""
         spread = tool.side and self.start_depth
         return ToolPath(self._sliced(frame, self._spread(frame, tool) if spread else self._lower(frame)), self.corners)
@@ -189,7 +189,7 @@ class Motion:
     def _lower(self, frame: Frame) -> Callable[[float], NDArray[np.float64]]:
         return lambda time: frame.point(self.depth(time))
 
-    def _spread(self, frame: Frame, half: Pointed) -> Callable[[float], NDArray[np.float64]]:
+    def _spread(self, frame: Frame, half: Insertable) -> Callable[[float], NDArray[np.float64]]:
         start = -half.side * half.half_width(self.start_depth)
 
         def position(time: float) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from cutsim.fields.sizes import global_range
 from cutsim.fields.twins import facet_nodes
 from cutsim.interface.crack import Crack
 from cutsim.studies.body import CrackedBody
-from cutsim.tools.pointed import Pointed
+from cutsim.tools.insertable import Insertable
 
 Facets = NDArray[np.int32]
 
@@ -67,7 +67,7 @@ class Frame:
         return 1 if mesh.comm.allreduce(float((arms @ self.normal).sum())) > 0 else -1
 
     @classmethod
-    def of(cls, body: CrackedBody, tool: Pointed, far: str, symmetry: str | None = None) -> Self:
+    def of(cls, body: CrackedBody, tool: Insertable, far: str, symmetry: str | None = None) -> Self:
         """The frame of a body that a tool is to cut. Collective.
 
         Args:
@@ -88,7 +88,7 @@ class Frame:
         slack, low, high = FLAT * (deepest - top), 0.0, 0.0
         if not body.state.axisymmetric:  # there the crack goes round the axis
             low, high = _span(mesh, facets, normal)
-            expected = f"normal to the crack, which reaches from {low:g} to {high:g} along it"
+            expected = f"{tool.halving}, which reaches from {low:g} to {high:g} along it"
             require("tool.lateral", tool.lateral, high - low <= slack, expected)
         origin = top * push + 0.5 * (low + high) * normal
         if mesh.geometry.dim == 3:
@@ -97,7 +97,7 @@ class Frame:
         return cls(origin, push, normal, deepest - top)
 
 
-def _directions(body: CrackedBody, tool: Pointed) -> tuple[Array, Array]:
+def _directions(body: CrackedBody, tool: Insertable) -> tuple[Array, Array]:
     """Direction of the push and normal of the crack plane, of the mesh's dimension."""
     gdim = body.domain.mesh.geometry.dim
     require("tool.push", tool.push, len(tool.push) == gdim, f"a direction of {gdim} components, as the mesh has")
@@ -105,9 +105,9 @@ def _directions(body: CrackedBody, tool: Pointed) -> tuple[Array, Array]:
     if body.state.axisymmetric:
         require("tool.push", tool.push, push[0] == 0, "along the axis x = 0 of the body of revolution")
         return push, np.array([1.0, 0.0])
-    given = tool.lateral is not None and len(tool.lateral) == gdim
-    require("tool.lateral", tool.lateral, given, f"the normal of the crack plane, of {gdim} components")
-    return push, np.array(tool.lateral)
+    given = tool.normal is not None and len(tool.normal) == gdim
+    require("tool.lateral", tool.normal, given, f"the normal of the crack plane, of {gdim} components")
+    return push, np.array(tool.normal)
 
 
 def _middle(body: CrackedBody, edge: Array, symmetry: str | None, slack: float) -> float:

@@ -26,7 +26,7 @@ from cutsim.studies.fixture import STANDING, Fixture
 from cutsim.studies.frame import Frame
 from cutsim.studies.plate import RestingPlate
 from cutsim.tools.carriage import Carriage
-from cutsim.tools.pointed import Pointed
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.tool_contact import ToolContact, doubt_units
 from cutsim.tools.tool_parts import PARTS, ToolParts
 
@@ -60,7 +60,7 @@ class Insertion:
     """
 
     body: CrackedBody
-    tool: Pointed
+    tool: Insertable
     frame: Frame
     motion: Motion
     contacts: tuple[ToolContact, ...]
@@ -76,7 +76,7 @@ class Insertion:
     def build(
         cls,
         body: CrackedBody,
-        tool: Pointed,
+        tool: Insertable,
         drive: Drive,
         *,
         notch: float = 0.0,
@@ -105,6 +105,8 @@ class Insertion:
         check_friction("friction", friction)
         fixture.check(body)
         _check_tool(tool, body)
+        whole = tool.mirrored or not fixture.halved(body)
+        require("fixture.symmetry", fixture.symmetry, whole, "no group of the mesh: both halves of this tool differ")
         frame = Frame.of(body, tool, fixture.plate, fixture.symmetry if fixture.halved(body) else None)
         _check_notch(body, tool, frame, notch)
         motion = Motion.of(drive, tool, notch, np.inf if fixture.ends else frame.height)
@@ -178,17 +180,18 @@ class Insertion:
         return rows | self.body.columns(columns)
 
 
-def _check_tool(tool: Pointed, body: CrackedBody) -> None:
+def _check_tool(tool: Insertable, body: CrackedBody) -> None:
     """Refuse half a tool, one given in degrees, and one of another kind than the body."""
     require("tool.side", tool.side, tool.side == 0, "0, the whole tool")
-    require("tool.half_angle", tool.half_angle, tool.half_angle <= _WIDEST, "at most π/3: it is in radians")
+    angle = getattr(tool, tool.angle)
+    require(f"tool.{tool.angle}", angle, angle <= _WIDEST, "at most π/3: it is in radians")
     revolved = body.state.axisymmetric
     flat = body.domain.mesh.geometry.dim == 2 and not revolved
     wanted = "a blade in the plane" if flat else "a needle in a body of revolution"
     require("tool", tool, not (flat and tool.round) and not (revolved and not tool.round), wanted)
 
 
-def _check_notch(body: CrackedBody, tool: Pointed, frame: Frame, notch: float) -> None:
+def _check_notch(body: CrackedBody, tool: Insertable, frame: Frame, notch: float) -> None:
     """Refuse a depth that is not that of the notch in the mesh, and a tool too blunt for it. Collective."""
     require_number("notch", notch, nonnegative)
     if body.notch is None:
@@ -196,16 +199,16 @@ def _check_notch(body: CrackedBody, tool: Pointed, frame: Frame, notch: float) -
         return
     depth = frame.span(body.domain.mesh, body.mouth, frame.push)[1]
     require("notch", notch, abs(notch - depth) <= 1e-3 * depth, f"{depth:g}, the depth of the notch in the mesh")
-    require_number("notch", notch, above(tool.tip_radius, "tool.tip_radius"))
+    require_number("notch", notch, above(tool.resolution, "the radius of the tip"))
 
 
-def _kind(tool: Pointed) -> str:
+def _kind(tool: Insertable) -> str:
     return type(tool).__name__.lower()
 
 
 def _contacts(
     body: CrackedBody,
-    tool: Pointed,
+    tool: Insertable,
     frame: Frame,
     motion: Motion,
     top: tuple[str, str],

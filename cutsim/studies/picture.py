@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cutsim.base.assembly import box
 from cutsim.base.signatures import checked
 from cutsim.results.pictures import draw_stress
-from cutsim.results.tool_surfaces import prism, revolved
+from cutsim.results.tool_surfaces import ToolSurfaces, prism, revolved
 from cutsim.studies.insertion import Insertion
+from cutsim.tools.pointed import Pointed
 
 if TYPE_CHECKING:
     import pyvista
@@ -42,6 +44,9 @@ def tool_surface(cut: Insertion) -> pyvista.PolyData | None:
         The surface, None where pyvista is missing.
     """
     frame, depth = cut.frame, cut.depth
+    if not isinstance(cut.tool, Pointed):
+        corners = box(cut.state.mesh.comm, cut.state.mesh.geometry.x)
+        return ToolSurfaces(cut.contacts)(tuple(np.transpose(corners).ravel()))
     outline = cut.tool.outline(max(depth, 0.0) + _ABOVE * frame.height)
     tip, axes, edge = frame.point(depth), (frame.normal, -frame.push), frame.edge
     if edge is None:

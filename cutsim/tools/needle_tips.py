@@ -1,16 +1,18 @@
 """Needles that are not pointed in the middle: with a bevel, and hollow (docs/theory.md §4)."""
 
 from dataclasses import dataclass
-from math import cos, pi, radians, sin, tan
+from math import cos, pi, radians, sin, sqrt, tan
 from typing import ClassVar
 
+import numpy as np
 import ufl
 
 from cutsim.base.checks import above, between, positive, require, require_number
-from cutsim.base.functions import larger
+from cutsim.base.functions import larger, positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.units import Angle, Length
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.shapes import Direction, along, flat_ended, from_axis, unit_vector
 
 # iterations for the nearest point of the edge of a bevel: 2e-6 of the radius for the sharpest and bluntest one
@@ -64,10 +66,13 @@ class HollowNeedle:
 
 @checked
 @dataclass(frozen=True)
-class BevelNeedle:
+class BevelNeedle(Insertable):
     """Round needle whose end is cut off obliquely, with a rounded edge, in 3-D.
 
     The reference point is on the axis, as high as the foremost point of the tip, which lies on the side of −lateral.
+    The needle is halved in its plane of symmetry, that of push and lateral: in this plane lies a crack along which it
+    is inserted.  With `side` = ±1 it is the *convex half needle* that one face of the crack meets: the half on the side
+    of ±push × lateral, continued without end to the other side.
 
     Args:
         bevel_angle: Angle between axis and face of the bevel [rad], from 15° to below π/2.
@@ -75,18 +80,25 @@ class BevelNeedle:
         edge_radius: Radius of the rounded edge > 0, at most a fifth of the radius [length].
         push: Direction in which the needle points.
         lateral: Direction, normal to push, to which the face of the bevel looks.
+        side: 0 for the whole needle, +1 or −1 for a half.
 
     Raises:
         ValueError: A value is outside its range, or push and lateral are not orthogonal vectors in space.
     """
 
     directions: ClassVar[tuple[str, ...]] = ("push", "lateral")
+    round: ClassVar[bool] = True
+    mirrored: ClassVar[bool] = False
+    halving: ClassVar[str] = "in the plane of the crack"
+    angle: ClassVar[str] = "bevel_angle"
+    firmness: ClassVar[tuple[float, float]] = (20.0, 0.1)  # as those of other needles
 
     bevel_angle: Angle
     radius: Length
     edge_radius: Length
     push: Direction = (0.0, 0.0, -1.0)
     lateral: Direction = (1.0, 0.0, 0.0)
+    side: int = 0
 
     def __post_init__(self) -> None:
         require_number("bevel_angle", self.bevel_angle, between(_SHARPEST, pi / 2, "[)", name="π/2 rad"))
@@ -98,19 +110,48 @@ class BevelNeedle:
             require(name, getattr(self, name), len(getattr(self, name)) == 3, "a vector of 3 numbers")
         inner = sum(p * q for p, q in zip(self.push, self.lateral, strict=True))
         require("lateral", self.lateral, abs(inner) < 1e-12, "orthogonal to push")
+        require("side", self.side, self.side in (-1, 0, 1), "-1, 0 or 1")
 
     @property
     def resolution(self) -> float:
         """Edge radius [length]."""
         return self.edge_radius
 
+    @property
+    def normal(self) -> Direction:
+        """Normal of its plane of symmetry, push × lateral."""
+        return tuple(float(n) for n in np.cross(self.push, self.lateral))
+
+    @property
+    def shaft_height(self) -> float:
+        """Height above the foremost point at which the section is the whole circle [length]."""
+        return self._height_of(self.radius)
+
+    def half_width(self, height: float, side: int | None = None) -> float:
+        """Half the chord of the section where the bevel cuts it off, of a needle with a sharp edge [length].
+
+        Args:
+            height: Height above the tip [length].
+            side: Of no consequence: both halves are alike.
+        """
+        tip = self._height_of(-self.radius)
+        edge = -self.radius + (height - tip) * tan(self.bevel_angle)
+        return sqrt(max(self.radius**2 - edge**2, 0.0)) if edge < 0 else self.radius
+
+    def _height_of(self, place: float) -> float:
+        """Height at which the plane of the bevel is at a place along lateral [length]."""
+        r, s, c = self.edge_radius, sin(self.bevel_angle), cos(self.bevel_angle)
+        return ((place + self.radius) * c - r * (1 + c - s)) / s
+
     def distance(self, x: Expr) -> Expr:
         """Distance to the core, a thinner cylinder with a sharp edge, minus the edge radius [length]."""
         r, s, c = self.edge_radius, sin(self.bevel_angle), cos(self.bevel_angle)
         core = self.radius - r
         u, height = along(x, self.lateral), -along(x, self.push) - r
-        radial = from_axis(x, self.push, r)
         v = along(x, ufl.cross(ufl.as_vector(self.push), ufl.as_vector(self.lateral)))
+        if self.side:  # both halves mirror each other: beyond the plane all is as in it
+            v = positive_part(self.side * v)
+        radial = ufl.sqrt(u**2 + v**2 + (1e-8 * r) ** 2)
         side, face = radial - core, (u + core) * c - height * s
         # < 0 outside of either surface, where its nearest point is within the other one
         beside = larger((core * u / radial + core) * c - height * s, -side)

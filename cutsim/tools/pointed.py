@@ -1,6 +1,6 @@
 """Blade and needle, whole or in halves (docs/theory.md §4)."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from math import cos, pi, sin, tan
 from typing import ClassVar
@@ -14,11 +14,8 @@ from cutsim.base.functions import larger, positive_part
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.units import Angle, Length
-from cutsim.interface.contact import PenaltyContact
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit_vector
-
-# penalty over E/h and half the width of the quadratic start over h, for an intact surface
-_FIRM, _BLEND = 1000.0, 0.1
 
 
 def _pointed(across: Expr, above: Expr, half_angle: float, width: float, scale: float) -> Expr:
@@ -44,7 +41,7 @@ def _pointed(across: Expr, above: Expr, half_angle: float, width: float, scale: 
     return ufl.conditional(ufl.lt(slope, 0), tip, flank)
 
 
-class Pointed(ABC):
+class Pointed(Insertable):
     """Base of blade and needle: a rounded tip, flanks at a half angle, and a shank.
 
     Attributes:
@@ -52,22 +49,17 @@ class Pointed(ABC):
         tip_radius: Radius of the tip and of the joint of flank and shank [length].
         push: Direction in which the tool points; the reference point is the foremost point of the tip.
         lateral: Direction normal to the plane in which the tool is halved.
-        side: 0 for the whole tool, +1 or −1 for the half on the side of ±lateral.
-        round: Whether it is a body of revolution about its axis, else it extends along an edge.
-        firmness: Penalty of its contact with a soft solid, times mesh size over Young's modulus, and half the width of
-            the quadratic start over the tip radius; as `contact` takes them.
     """
 
     directions: ClassVar[tuple[str, ...]] = ("push", "lateral")
 
     half_angle: Angle
     tip_radius: Length
-    push: Direction
-    lateral: Direction | None
-    side: int
-    round: ClassVar[bool]
-    # measured: stiff enough for the force, soft enough for Newton's method
-    firmness: ClassVar[tuple[float, float]]
+
+    @property
+    def normal(self) -> Direction | None:
+        """The lateral direction."""
+        return self.lateral
 
     @property
     @abstractmethod
@@ -78,28 +70,6 @@ class Pointed(ABC):
     def resolution(self) -> float:
         """Tip radius [length]."""
         return self.tip_radius
-
-    def contact(self, young: float, h: float) -> PenaltyContact:
-        """Contact law of the tool in a soft solid, as soft as the force allows.
-
-        Args:
-            young: Young's modulus of the solid [stress].
-            h: Size of its cells normal to the surface [length].
-        """
-        factor, blend = self.firmness
-        return PenaltyContact.automatic(young, h, factor, blend=blend * self.tip_radius)
-
-    @staticmethod
-    def firm_contact(young: float, h: float) -> PenaltyContact:
-        """Contact law for an intact surface, on which a tip presses much harder than in a cut.
-
-        The pressure grows with the square of the penetration. At 25 times Young's modulus that is a tenth of h.
-
-        Args:
-            young: Young's modulus of the solid [stress].
-            h: Size of its cells normal to the surface [length].
-        """
-        return PenaltyContact.automatic(young, h, _FIRM, blend=_BLEND * h)
 
     def flank_angle(self, side: int) -> float:
         """Angle between axis and flank on the side of ±lateral [rad]."""

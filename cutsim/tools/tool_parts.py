@@ -8,7 +8,7 @@ from dolfinx.mesh import Mesh
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns
 from cutsim.fields.points import Values
-from cutsim.tools.pointed import Pointed
+from cutsim.tools.insertable import Insertable
 from cutsim.tools.shapes import with_constant_directions
 from cutsim.tools.tool_contact import Patch, ToolContact
 
@@ -22,7 +22,7 @@ _Parts = dict[tuple[str, str], float]
 class ToolParts:
     """Force and friction work of tip and shaft of a tool, as an observer of the mechanics.
 
-    A point of the body counts to the part beside which it is now; the shaft begins at `Pointed.shaft_height`.  The
+    A point of the body counts to the part beside which it is now; the shaft begins at `Insertable.shaft_height`.  The
     parts sum up to the tool's force and friction work, as they come from the same tractions at the same points.
 
     Args:
@@ -32,7 +32,7 @@ class ToolParts:
     """
 
     @checked
-    def __init__(self, tools: Sequence[ToolContact], shape: Pointed, name: str = "tool_parts") -> None:
+    def __init__(self, tools: Sequence[ToolContact], shape: Insertable, name: str = "tool_parts") -> None:
         self.name = name
         self._shaft = shape.shaft_height
         self._patches = [(patch, _evaluator(tool.state.mesh, patch, shape)) for tool in tools for patch in tool.patches]
@@ -71,7 +71,7 @@ class ToolParts:
         return self._known.trial["work", part]
 
 
-def _evaluator(mesh: Mesh, patch: Patch, shape: Pointed) -> Callable[[], dict[str, Values]]:
+def _evaluator(mesh: Mesh, patch: Patch, shape: Insertable) -> Callable[[], dict[str, Values]]:
     """Force densities against the push, and height above the foremost point."""
     back = -ufl.as_vector(with_constant_directions(mesh, shape).push)
     friction = ufl.as_ufl(0.0) if patch.slip is None else ufl.dot(patch.slip.traction, back)

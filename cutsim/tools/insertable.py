@@ -1,0 +1,88 @@
+"""What an insertion asks of the tool that it pushes along a crack, whole or in halves (docs/needle_insertion.md)."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from cutsim.base.kinematics import Expr
+from cutsim.interface.contact import PenaltyContact
+from cutsim.tools.shapes import Direction
+
+# penalty over E/h and half the width of the quadratic start over h, for an intact surface
+_FIRM, _BLEND = 1000.0, 0.1
+
+
+class Insertable(ABC):
+    """Base of blades and needles that can be halved in the plane of a crack, whose faces meet a half each.
+
+    Attributes:
+        push: Direction in which the tool points; the reference point is on its axis, as high as the foremost point.
+        lateral: Direction across that tells how it is turned about its axis.
+        side: 0 for the whole tool, +1 or −1 for the half on the side of ±normal, continued without end to the other
+            side.
+        round: Whether its shank is a body of revolution, else it extends along an edge.
+        mirrored: Whether it is symmetric about the plane of its axis and of the normal of the crack.
+        halving: How its direction `lateral` has to lie to the crack, in words.
+        angle: Name of its angle between axis and flank.
+        firmness: Penalty of its contact with a soft solid, times mesh size over Young's modulus, and half the width of
+            the quadratic start over the radius of the tip; as `contact` takes them.
+    """
+
+    push: Direction
+    lateral: Direction | None
+    side: int
+    round: ClassVar[bool]
+    mirrored: ClassVar[bool] = True
+    halving: ClassVar[str] = "normal to the crack"
+    angle: ClassVar[str] = "half_angle"
+    # measured: stiff enough for the force, soft enough for Newton's method
+    firmness: ClassVar[tuple[float, float]]
+
+    @property
+    @abstractmethod
+    def resolution(self) -> float:
+        """Radius of the tip, or of its edge [length]."""
+
+    @property
+    @abstractmethod
+    def normal(self) -> Direction | None:
+        """Normal of the plane in which it is halved, None for a whole one that need not know."""
+
+    @property
+    @abstractmethod
+    def shaft_height(self) -> float:
+        """Height above the foremost point at which the shank begins [length]."""
+
+    @abstractmethod
+    def half_width(self, height: float, side: int | None = None) -> float:
+        """Distance from the plane in which it is halved to its surface, a height above the tip [length].
+
+        Args:
+            height: The height [length].
+            side: On the side of ±normal; by default that of the tool, and + of a whole one.
+        """
+
+    @abstractmethod
+    def distance(self, x: Expr) -> Expr:
+        """Signed distance at a position relative to the reference point [length], negative inside."""
+
+    def contact(self, young: float, h: float) -> PenaltyContact:
+        """Contact law of the tool in a soft solid, as soft as the force allows.
+
+        Args:
+            young: Young's modulus of the solid [stress].
+            h: Size of its cells normal to the surface [length].
+        """
+        factor, blend = self.firmness
+        return PenaltyContact.automatic(young, h, factor, blend=blend * self.resolution)
+
+    @staticmethod
+    def firm_contact(young: float, h: float) -> PenaltyContact:
+        """Contact law for an intact surface, on which a tip presses much harder than in a cut.
+
+        The pressure grows with the square of the penetration. At 25 times Young's modulus that is a tenth of h.
+
+        Args:
+            young: Young's modulus of the solid [stress].
+            h: Size of its cells normal to the surface [length].
+        """
+        return PenaltyContact.automatic(young, h, _FIRM, blend=_BLEND * h)
