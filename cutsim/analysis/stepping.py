@@ -222,7 +222,9 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
         size, cuts = control.next(tried), cuts + 1
         require("control.next(report)", size, size < tried.dt, f"less than {tried.dt:.6g} after a rejected step")
         logger.info("step to %.6g rejected (%s); next try %.3g", end, tried.refusal, size)
-        if not (followed or drag) and (size < control.smallest or _eager(problem, control)):
+        # a step that fails is halved before, but not one that has jumped
+        early = tried.outcome.converged or control.path.onset is not None or cuts > 1
+        if not (followed or drag) and (size < control.smallest or (early and _eager(problem, control))):
             followed = True
             if (along := follow(problem, control, corner)) is not None:
                 logger.info("from time %.6g the equilibrium path is followed", start)
