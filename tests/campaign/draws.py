@@ -127,8 +127,8 @@ class Draw:
         notch = _NOTCH if self.notch else 0.0
         space = f"B = {_EDGE:g}\nsym = 1\nnz = {_LAYERS}\n" if self.dim == 3 else ""
         directions = "push = [0, -1, 0]\nlateral = [1, 0, 0]\n" if self.dim == 3 else ""
-        # what an edge indents, or draws along, is kept in its plane: body and blade are alike on both sides
-        faces = "faces = { symmetric = true }\n" if self.friction or not self.notch else ""
+        # body and blade are alike on both sides; else a node that lets go may do so to the wrong one
+        faces = "faces = { symmetric = true }\n"
         turning = "" if self.motion == "push" else f"turning_depth = {depth:g}\n"
         # drawn out: until it is where the push began
         start = 0.8 * notch
