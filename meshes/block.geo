@@ -10,6 +10,8 @@
 //
 // dim = 3: z from 0 to B, faces "front" (z = 0) and "back" (z = B). With sym = 1 only the half 0 < z < B/2 of a
 // block centred on z = 0, faces "symmetry" (z = 0) and "back" (z = B/2). With notch = 0 there is no facet "notch".
+// axis > 0 (dim = 2): meridian plane of a body of revolution about x = 0, whose crack is a cylinder of this radius; the left
+// half ends on the axis.
 // Sizes: lc along the crack down to `deep` and across it to `band`, growing from there; smaller ones, from `entry` on, at
 // the mouth of the crack or of the notch, where a tool that starts above the surface indents it.
 Include "common.geo";
@@ -17,6 +19,7 @@ DefineConstant[
   dim    = {3,    Name "dim"},     // 2 or 3
   Lx     = {30,   Name "Lx"},      // length of each half
   H      = {4.2,  Name "H"},       // thickness
+  axis   = {0,    Name "axis"},    // radius of a crack about the axis of revolution, 0: a plane crack
   B      = {10.1, Name "B"},       // width, the length of the cutting edge (dim = 3)
   sym    = {0,    Name "sym"},     // 1: half the width (dim = 3)
   notch  = {0.5,  Name "notch"},   // depth of the starting notch
@@ -39,12 +42,15 @@ EndIf
 If (deep < 0 || deep > H || deep > 0 && deep <= notch || entry < 0)
   Error("deep = %g must be 0 or lie in (notch = %g, H = %g], entry = %g must be at least 0", deep, notch, H, entry);
 EndIf
+If (axis < 0 || axis > 0 && (dim == 3 || axis <= band))
+  Error("axis = %g must be 0, or with dim = 2 larger than band = %g", axis, band);
+EndIf
 
 deepest = deep > 0 ? deep : H;
 mouth = entry; // of the crack, if there is no notch
 lines[] = {};
 foot = 1;
-Point(foot) = {0, 0, 0};
+Point(foot) = {axis, 0, 0};
 If (notch > 0)
   length = notch;
   fine = notch;
@@ -60,26 +66,30 @@ Call FromMouth;
 crack[] = Extrude {0, -length, 0} { Point{foot}; Layers{layers[], ends[]}; };
 lines[] += {crack[1]};
 
-length = Lx;
 fine = band;
 entry = mouth;
-Call FromMouth;
 For side In {-1:1:2}
-  Extrude {side * Lx, 0, 0} { Curve{lines[]}; Layers{layers[], ends[]}; Recombine; }
+  length = side < 0 && axis > 0 ? axis : Lx;
+  Call FromMouth;
+  Extrude {side * length, 0, 0} { Curve{lines[]}; Layers{layers[], ends[]}; Recombine; }
 EndFor
 depth = sym ? B / 2 : B;
 Call Thicken;
 
 e = 1e-6 * H;
-name = "left";      box[] = {-Lx, 0, -H, 0};         Call Cells;
-name = "right";     box[] = {0, Lx, -H, 0};          Call Cells;
-name = "crack";     box[] = {0, 0, -H, -notch};      Call Facets;
-name = "top_left";  box[] = {-Lx, 0, 0, 0};          Call Facets;
-name = "top_right"; box[] = {0, Lx, 0, 0};           Call Facets;
-name = "bottom";    box[] = {-Lx, Lx, -H, -H};       Call Facets;
-name = "far_left";  box[] = {-Lx, -Lx, -H, 0};       Call Facets;
-name = "far_right"; box[] = {Lx, Lx, -H, 0};         Call Facets;
+near = axis > 0 ? 0 : -Lx;
+far = axis + Lx;
+name = "left";      box[] = {near, axis, -H, 0};       Call Cells;
+name = "right";     box[] = {axis, far, -H, 0};        Call Cells;
+name = "crack";     box[] = {axis, axis, -H, -notch};  Call Facets;
+name = "top_left";  box[] = {near, axis, 0, 0};        Call Facets;
+name = "top_right"; box[] = {axis, far, 0, 0};         Call Facets;
+name = "bottom";    box[] = {near, far, -H, -H};       Call Facets;
+name = "far_right"; box[] = {far, far, -H, 0};         Call Facets;
+If (axis == 0)
+  name = "far_left"; box[] = {-Lx, -Lx, -H, 0}; Call Facets;
+EndIf
 If (notch > 0)
-  name = "notch"; box[] = {0, 0, -notch, 0}; Call Facets;
+  name = "notch"; box[] = {axis, axis, -notch, 0}; Call Facets;
 EndIf
 name = StrChoice(sym, "symmetry", "front"); Call Ends;

@@ -167,6 +167,8 @@ def test_faces_that_slide_are_a_pair():
     assert np.abs(sliding["energy_closure"]).max() < 0.01
     with pytest.raises(ValueError, match="sliding"):
         Faces(sliding=True, symmetric=True)
+    with pytest.raises(ValueError, match="sliding"):
+        Faces(sliding=True, firm=True)
 
 
 def test_a_body_without_a_notch_is_entered_at_its_surface():

@@ -82,6 +82,18 @@ def test_an_intact_surface_is_punctured():
     assert set(cut.state.verdict.doubts) <= {"viscosity"}, "which takes what is set free"
 
 
+def test_a_tool_in_a_notch_is_as_firm_as_on_an_intact_surface_where_faces_are():
+    """So that nothing but the puncture tells two cuts apart."""
+    firm, soft = (
+        Insertion.build(cracked_block(block(notch=0.3), SOLID, BOND, faces=faces), BLADE, Drive(1.0), notch=0.3)
+        for faces in (Faces(firm=True), Faces())
+    )
+    size = firm.body.cracks[0].normal_size
+    for contact in firm.contacts:
+        assert contact.contact == BLADE.firm_contact(SOLID.young, size)
+    assert soft.contacts[0].contact == BLADE.contact(SOLID.young, size)
+
+
 def test_faces_of_a_thread_are_not_alike():
     domain = read_geo(geometry("thread"), COMM, {"R": 1, "H": 2, "deep": 1, "lc": 0.3, "notch": 0}, gdim=2)
     with pytest.raises(ValueError, match=r"faces.symmetric = True .* body of revolution"):
@@ -109,3 +121,21 @@ def test_a_body_that_is_held_at_its_ends_is_cut_through():
     assert np.abs(column["energy_closure"]).max() < 0.02
     with pytest.raises(ValueError, match="depth"):
         Insertion.build(body, tool, Drive(1.0), notch=0.4).time_of(1.1)
+
+
+@pytest.mark.mpi
+def test_a_blade_in_a_body_of_revolution_is_a_ring():
+    """Its edge goes round the axis: where this is far away it dents a block as a straight edge of the same length."""
+    tool, bond, far = Blade(np.radians(25), 0.05, 0.35, back_angle=0.0), Exponential(strength=0.45, toughness=0.1), 40.0
+    sizes = {"Lx": far, "lc": 0.05, "entry": 0.02, "deep": 0.5}
+
+    def dented(axis):
+        body = cracked_block(block(axis=axis, **sizes), SOLID, bond, axisymmetric=axis > 0, faces=Faces(firm=True))
+        cut, rows = Insertion.build(body, tool, Drive(1.0)), []
+        control = StepControl(first=0.01, largest=0.02)
+        run(cut.mechanics, cut.time_of(0.04), control, lambda r: rows.append(cut.columns(r.columns)))
+        assert tuple(cut.frame.origin) == pytest.approx((axis, 0.0)) and len(cut.contacts) == 2
+        assert rows[-1]["imbalance"][0] < 1e-6
+        return rows[-1]["force"][0]
+
+    assert dented(far) == pytest.approx(2 * np.pi * far * dented(0.0), rel=0.02)

@@ -108,6 +108,22 @@ def test_elements_fit_the_layers():
     np.testing.assert_allclose(steps[4:] / steps[3:-1], 1.3)
 
 
+def test_elements_at_the_mouth_are_small_and_grow():
+    """From the wanted size, by a fifth of the distance, to that along the crack; layers keep their bounds."""
+    layers = {"skin": 0.5, "fat": 1.5}
+    domain = laminate(MPI.COMM_SELF, layers, length=2.0, size=0.1, band=0.4, entry=0.03)
+    x, y = (np.unique(domain.mesh.geometry.x[:, i].round(12)) for i in (0, 1))
+    for lines in (x[x > -1e-9], -y[::-1]):
+        at, steps = lines[:-1], np.diff(lines)
+        assert 0.02 < steps[0] <= 0.03 + 1e-12
+        near = at < 0.35
+        assert np.all(steps[near] <= 0.03 + 0.2 * at[near] + 1e-9) and np.all(
+            steps[at < 0.3] > 0.02 + 0.15 * at[at < 0.3]
+        )
+    assert np.isclose(y, -0.5).any() and -y[0] == pytest.approx(2.0)
+    assert np.diff(y).max() <= 0.1 + 1e-12
+
+
 @pytest.mark.mpi
 @pytest.mark.parametrize("dim", [2, 3])
 def test_tension_along_the_layers_adds_their_stiffnesses(dim):
@@ -301,6 +317,7 @@ def test_hypodermis_has_the_moduli_of_its_source():
         ({"size": 0.0}, "size"),
         ({"band": 2.0}, "band"),
         ({"notch": 1.0}, "notch"),
+        ({"entry": 0.3}, "entry"),
         ({"least": 0}, "least"),
         ({"width": -1.0}, "width"),
         ({"width": 1.0, "rows": 0}, "rows"),

@@ -194,9 +194,11 @@ class Solid(Term):
         """Doubt elements that are almost flat. Collective."""
         smallest = self.smallest_jacobian()
         if smallest < _FLAT:
+            # where elements of degree 1 are folded, smaller ones are so too
+            cure = "smaller ones" if self.state.V.ufl_element().degree > 1 else "smaller ones, or those of degree 2,"
             self.state.verdict.doubt(
                 f"{self.name}: J",
-                f"{self.name}: an element is squeezed to {smallest:.2g} of its volume, smaller ones are needed",
+                f"{self.name}: an element is squeezed to {smallest:.2g} of its volume, {cure} are needed",
                 -smallest,
             )
 

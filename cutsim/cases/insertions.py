@@ -86,7 +86,8 @@ def _cracked(domain: Domain) -> tuple[CrackedBody, Temperature | None]:
         cracks = (faces.crack(state, bonded, plus, tables.law, young=softest(bodies, bonded)),)
         cut = [faces.crack(state, f, plus, None, young=softest(bodies, f), name="notch") for f in broken]
         guides, pairs, slit = faces.guides(cracks), faces.pairs([*cut, *cracks]), cut[0] if cut else None
-    return CrackedBody(domain.tagged, state, bodies, cracks, slit, guides=guides, pairs=pairs), value
+    made: dict[str, Any] = {"guides": guides, "pairs": pairs, "faces": faces}
+    return CrackedBody(domain.tagged, state, bodies, cracks, slit, **made), value
 
 
 def _state(domain: Domain, split: Sequence[Entities]) -> State:

@@ -19,6 +19,7 @@ SIDES = ("notch", "top_left", "top_right", "bottom", "far_left", "far_right", "f
 HALVES = ("left", "right")
 
 _GROWTH = 1.3  # ratio of neighbouring sizes beside the band
+_NEAR = 0.2  # growth of the sizes per distance from the mouth
 
 
 @checked
@@ -30,6 +31,7 @@ def laminate(
     size: float,
     band: float,
     notch: float = 0.0,
+    entry: float = 0.0,
     least: int = 2,
     width: float | None = None,
     rows: int = 4,
@@ -52,6 +54,8 @@ def laminate(
         size: Largest element along the crack plane and across it within the band [length].
         band: Half width of the zone of uniform size about the crack plane, beside which elements grow [length].
         notch: Depth of the notch from the top, less than that of the block [length].
+        entry: Elements at the mouth of the crack, where a tool that starts above the surface indents it; they grow to
+            `size` from there. 0 for elements as along the crack [length].
         least: Elements through a layer, at least; thin layers have no more.
         width: Width along z of a block in 3-D, from z = 0 on; None for the plane [length].
         rows: Elements across the width.
@@ -69,40 +73,50 @@ def laminate(
     require_number("length", length, positive)
     require_number("band", band, between(0, length, "(]", name="length"))
     require_number("notch", notch, between(0, height, "[)", name="height"))
+    require_number("entry", entry, between(0, size, "[]", name="size"))
     require_number("least", least, count(1))
     require_number("width", width, positive.or_none)
     require_number("rows", rows, count(1))
     require_number("thread", thread, positive.or_none)
     require("width", width, width is None or thread is None, "None for a body of revolution")
-    half = _graded(length, size, band)
+    half = _graded(length, size, band, entry)
     bounds = -np.concatenate([[0.0], np.cumsum(list(layers.values()))])
     across = np.concatenate([-half[:0:-1], half]) if thread is None else np.append(0.0, thread + half)
-    lines = [across, _down(bounds, size, notch, least)[::-1]]
+    lines = [across, _down(bounds, size, notch, least, entry)[::-1]]
     if width is not None:
         lines.append(np.linspace(0.0, width, rows + 1))
     cells, facets = _markers(layers, bounds, across, thread or 0.0, notch, width)
     return tag_mesh(_grid(comm, lines), cells, facets)
 
 
-def _graded(length: float, size: float, band: float) -> Array:
+def _graded(length: float, size: float, band: float, entry: float) -> Array:
     """Lines from the crack plane to the end of a half."""
-    inner = np.linspace(0.0, band, math.ceil(band / size - 1e-9) + 1)
-    rest = length - band
+    inner = _lines(0.0, band, size, entry)
+    rest, last = length - band, min(size, entry + _NEAR * band) if entry else size
     # the sum of a geometric series reaches the rest
-    n = math.ceil(math.log1p(rest / size * (_GROWTH - 1) / _GROWTH) / math.log(_GROWTH) - 1e-9)
+    n = math.ceil(math.log1p(rest / last * (_GROWTH - 1) / _GROWTH) / math.log(_GROWTH) - 1e-9)
     outer = np.cumsum(_GROWTH ** np.arange(n))
     return np.append(inner, band + rest * outer / outer[-1:])
 
 
-def _down(bounds: Array, size: float, notch: float, least: int) -> Array:
+def _down(bounds: Array, size: float, notch: float, least: int, entry: float) -> Array:
     """Lines from the top to the bottom, among them the bounds of the layers and the end of the notch."""
     lines = [bounds[:1]]
     for top, bottom in pairwise(bounds):
         stops = [top, -notch, bottom] if bottom < -notch < top else [top, bottom]
         for a, b in pairwise(stops):
-            n = math.ceil((a - b) / min(size, (top - bottom) / least) - 1e-9)
-            lines.append(np.linspace(a, b, n + 1)[1:])
+            lines.append(-_lines(-a, -b, min(size, (top - bottom) / least), entry)[1:])
     return np.concatenate(lines)
+
+
+def _lines(start: float, end: float, size: float, entry: float) -> Array:
+    """Lines between two distances from the mouth, of a size that begins there with `entry`."""
+    if not entry or entry + _NEAR * start >= size:
+        return np.linspace(start, end, math.ceil((end - start) / size - 1e-9) + 1)
+    places = [start]
+    while places[-1] < end * (1 - 1e-9):
+        places.append(places[-1] + min(size, entry + _NEAR * places[-1]))
+    return start + (np.array(places) - start) * (end - start) / (places[-1] - start)
 
 
 def _grid(comm: MPI.Comm, lines: list[Array]) -> Mesh:

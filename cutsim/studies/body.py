@@ -45,6 +45,9 @@ class Faces:
         symmetric: Whether body and tool are alike on both sides of a plane crack.
         sliding: Whether the faces slide over each other by more than a facet, as at the rim of a notch into which a
             tool with much friction is pushed. They then look for each other anew, at a higher cost.
+        firm: Whether tool and faces penetrate each other as little as under a tip that indents an intact surface, and
+            the faces part along the normal that they had: for an edge that goes round a body of revolution, and for a
+            cut from a notch that is compared with a puncture. Faces that are alike are firm in any case.
         friction: Friction of the faces on each other, a law, or the coefficient of Coulomb's; None for none. It acts
             where the bond is broken.
 
@@ -54,11 +57,13 @@ class Faces:
 
     symmetric: bool = False
     sliding: bool = False
+    firm: bool = False
     friction: AnyFriction = None
 
     def __post_init__(self) -> None:
         check_friction("friction", self.friction)
-        require("sliding", self.sliding, not (self.sliding and self.symmetric), "False where both sides are alike")
+        firm = self.symmetric or self.firm
+        require("sliding", self.sliding, not (self.sliding and firm), "False where both sides are alike or firm")
 
     def crack(
         self,
@@ -76,6 +81,7 @@ class Faces:
             options["friction"] = self.friction
         if self.symmetric:
             require("faces.symmetric", True, not state.axisymmetric, "False in a body of revolution")
+        if self.symmetric or self.firm:
             smallest = global_range(state.mesh.comm, normal_size(state.mesh, facets))[0]
             firm = PenaltyContact.automatic(young, smallest, _FIRM, blend=_BLEND * smallest)
             options |= {"normal": "reference", "contact": firm}
@@ -114,6 +120,7 @@ class CrackedBody:
         notch: Faces that touch and do not stick, from the surface to the first crack; None without a notch.
         guides: What keeps the middle of the cracks in their plane, see `Faces`.
         pairs: What carries the pressure of faces that slide over each other, see `Faces`.
+        faces: How the faces of cracks and notch meet.
     """
 
     domain: TaggedMesh
@@ -123,6 +130,7 @@ class CrackedBody:
     notch: Crack | None
     guides: tuple[Guide, ...] = field(default=(), kw_only=True)
     pairs: tuple[SurfacePair, ...] = field(default=(), kw_only=True)
+    faces: Faces = field(default=PLAIN, kw_only=True)
 
     @property
     def terms(self) -> list[Term]:
@@ -194,6 +202,7 @@ def cracked_block(
         open_[0] if open_ else None,
         guides=faces.guides(cut),
         pairs=faces.pairs([*open_, *cut]),
+        faces=faces,
     )
 
 

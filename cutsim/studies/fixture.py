@@ -40,7 +40,7 @@ class Fixture:
         ends: Facets at the far ends, one group on either side of the crack plane, which are held along its normal; they
             are free if there are none. In a body of revolution they are one group, its rim.
         drawn: Way by which each end is drawn outwards while the tool comes into the notch [length].
-        thread: Cells of the thread in a body of revolution, which stays on the axis.
+        thread: Cells of the thread in a body of revolution, which stays on the axis; not used with a blade, a ring.
 
     Raises:
         ValueError: Ends are to be drawn and there are none, or a body that does not rest on the plate is to rub on it.
@@ -93,6 +93,8 @@ class Fixture:
         domain, edge = body.domain, frame.edge
         parts = [self._end(body, frame, name, entry_time) for name in self.ends]
         if body.state.axisymmetric:
+            if frame.origin[0] > FLAT * frame.height:  # the tool is a ring, and what it cuts out deforms
+                return [*parts, Support(body.state, _axis(body, frame), 0, dim=0)]
             return [*parts, Support(body.state, domain.cells(self.thread), 0, dim=2)]
         line = _line(body, frame)
         if not self.ends:
@@ -142,6 +144,12 @@ def _line(body: CrackedBody, frame: Frame) -> NDArray[np.int32]:
         return (np.abs(arms @ frame.normal) <= slack) & (np.abs(arms @ frame.push - frame.height) <= slack)
 
     return np.asarray(locate_entities_boundary(body.domain.mesh, 0, on_line))
+
+
+def _axis(body: CrackedBody, frame: Frame) -> NDArray[np.int32]:
+    """Vertices on the axis of a body of revolution."""
+    slack = FLAT * frame.height
+    return np.asarray(locate_entities_boundary(body.domain.mesh, 0, lambda x: np.abs(x[0]) <= slack))
 
 
 def _middle_of(body: CrackedBody, vertices: NDArray[np.int32], frame: Frame, edge: Array) -> NDArray[np.int32]:

@@ -29,9 +29,11 @@ class Frame:
 
     Attributes:
         origin: Where the tip enters: on the surface, in the plane of the crack; in space in the plane of symmetry or,
-            without one, in the middle of the crack's mouth. On the axis of a body of revolution [length].
+            without one, in the middle of the crack's mouth. In a body of revolution a needle enters on the axis, and a
+            blade, which there is a ring, on the crack around it [length].
         push: Unit vector along which the tool is pushed.
-        normal: Unit normal of the crack plane, on which the half of the tool with side +1 lies.
+        normal: Unit normal of the crack plane, on which the half of the tool with side +1 lies; of a body of revolution
+            in its meridian plane.
         height: Depth of the body's far side [length].
     """
 
@@ -86,7 +88,7 @@ class Frame:
         found = f"along which the crack begins at {top:g} and the group {far!r} lies at {deepest:g}"
         require("tool.push", tool.push, deepest > top, f"a direction from the surface into the body, not one {found}")
         slack, low, high = FLAT * (deepest - top), 0.0, 0.0
-        if not body.state.axisymmetric:  # there the crack goes round the axis
+        if not on_axis(body, tool):
             low, high = _span(mesh, facets, normal)
             expected = f"{tool.halving}, which reaches from {low:g} to {high:g} along it"
             require("tool.lateral", tool.lateral, high - low <= slack, expected)
@@ -97,6 +99,11 @@ class Frame:
         return cls(origin, push, normal, deepest - top)
 
 
+def on_axis(body: CrackedBody, tool: Insertable) -> bool:
+    """Whether the tool is a needle on the axis of a body of revolution, where a blade is a ring about the axis."""
+    return body.state.axisymmetric and tool.round
+
+
 def _directions(body: CrackedBody, tool: Insertable) -> tuple[Array, Array]:
     """Direction of the push and normal of the crack plane, of the mesh's dimension."""
     gdim = body.domain.mesh.geometry.dim
@@ -104,6 +111,7 @@ def _directions(body: CrackedBody, tool: Insertable) -> tuple[Array, Array]:
     push = np.array(tool.push)
     if body.state.axisymmetric:
         require("tool.push", tool.push, push[0] == 0, "along the axis x = 0 of the body of revolution")
+    if on_axis(body, tool):  # the crack goes round it
         return push, np.array([1.0, 0.0])
     given = tool.normal is not None and len(tool.normal) == gdim
     require("tool.lateral", tool.normal, given, f"the normal of the crack plane, of {gdim} components")

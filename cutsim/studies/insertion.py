@@ -23,7 +23,7 @@ from cutsim.studies.body import CrackedBody
 from cutsim.studies.cut_area import CutArea
 from cutsim.studies.drive import Drive, Motion
 from cutsim.studies.fixture import STANDING, Fixture
-from cutsim.studies.frame import Frame
+from cutsim.studies.frame import Frame, on_axis
 from cutsim.studies.plate import RestingPlate
 from cutsim.tools.carriage import Carriage
 from cutsim.tools.insertable import Insertable
@@ -41,7 +41,8 @@ class Insertion:
 
     The tool moves along its direction `push`, and is halved in the plane of the crack, whose normal is its direction
     `lateral`: each face of the crack meets a half.  In a body of revolution the face around the thread meets the whole
-    needle, whose tip destroys the thread.
+    needle, whose tip destroys the thread; a blade is a ring there, each half of which meets a face of the crack around
+    the axis.
 
     Attributes:
         body: Solids, crack and notch.
@@ -89,7 +90,7 @@ class Insertion:
 
         Args:
             body: The body, from `cracked_block`, `LayeredBlock.build` or put together by hand.
-            tool: The whole tool (side 0); a blade, or in a body of revolution and in space a needle.
+            tool: The whole tool (side 0); a blade, in a body of revolution a ring, or there and in space a needle.
             drive: Its motion.
             notch: Depth of the notch in which the tool is inserted, 0 for a body without one [length].
             friction: Friction of tool and body, a law, or the coefficient of Coulomb's; None for none.
@@ -115,7 +116,7 @@ class Insertion:
         carriage = None
         if machine is not None:
             driven, release = motion.driven(machine, frame, factor)
-            path = motion.push(frame, halves=not body.state.axisymmetric)
+            path = motion.push(frame, halves=not on_axis(body, tool))
             carriage = Carriage(body.state, path, [driven], name=f"{_kind(tool)}_drive", release=release)
         contacts = _contacts(body, tool, frame, motion, fixture.top, friction, carriage)
         parts, plate = ToolParts(contacts, tool), fixture.support(body, frame)
@@ -181,14 +182,12 @@ class Insertion:
 
 
 def _check_tool(tool: Insertable, body: CrackedBody) -> None:
-    """Refuse half a tool, one given in degrees, and one of another kind than the body."""
+    """Refuse half a tool, one given in degrees, and a needle in the plane."""
     require("tool.side", tool.side, tool.side == 0, "0, the whole tool")
     angle = getattr(tool, tool.angle)
     require(f"tool.{tool.angle}", angle, angle <= _WIDEST, "at most π/3: it is in radians")
-    revolved = body.state.axisymmetric
-    flat = body.domain.mesh.geometry.dim == 2 and not revolved
-    wanted = "a blade in the plane" if flat else "a needle in a body of revolution"
-    require("tool", tool, not (flat and tool.round) and not (revolved and not tool.round), wanted)
+    flat = body.domain.mesh.geometry.dim == 2 and not body.state.axisymmetric
+    require("tool", tool, not (flat and tool.round), "a blade in the plane")
 
 
 def _check_notch(body: CrackedBody, tool: Insertable, frame: Frame, notch: float) -> None:
@@ -218,12 +217,14 @@ def _contacts(
     """The tool on each face of each part of the crack."""
     plus = frame.side(body.cracks[0])
     faces: list[tuple[Literal["+", "-"], int, str]] = [("+", plus, top[1])]
-    if not body.state.axisymmetric:  # there the thread does not meet the tool
+    whole = on_axis(body, tool)
+    if not whole:  # else the thread does not meet the tool
         faces.append(("-", -plus, top[0]))
-    firm = bool(body.guides) or (body.notch is None and body.state.axisymmetric)
+    intact = body.notch is None and body.state.axisymmetric
+    firm = body.faces.symmetric or body.faces.firm or intact
     found = []
     for face, side, group in faces:
-        half = tool if body.state.axisymmetric else replace(tool, side=side)  # type: ignore[type-var]
+        half = tool if whole else replace(tool, side=side)  # type: ignore[type-var]
         for crack in body.cracks:
             soft = half.contact(crack.young, crack.normal_size)
             name = "_".join([_kind(tool), _SIDES[side], *([crack.name] if len(body.cracks) > 1 else [])])

@@ -130,7 +130,7 @@ class LayeredBlock(CrackedBody):
         notch = [faces.crack(state, where, towards, None, young=_softest(through), name="notch") for where in broken]
         guides, pairs = faces.guides(cracks), faces.pairs([*notch, *cracks])
         cut = notch[0] if notch else None
-        return cls(domain, state, solids, cracks, cut, tuple(layers), guides=guides, pairs=pairs)
+        return cls(domain, state, solids, cracks, cut, tuple(layers), guides=guides, pairs=pairs, faces=faces)
 
     def layers_of(self, crack: Crack) -> list[Layer]:
         """The layers through which a part of the crack goes."""

@@ -7,6 +7,10 @@
 #
 # 1. After the puncture nothing is left of how the cut began.  The force and the toughness by force and front are those
 #    of the same tool that starts in a notch.
+#    "After" has a measure that is known beforehand.  Whatever the surface looks like after the event, its tractions
+#    balance themselves, and are not felt farther away than half of the block is wide (Saint-Venant).  So the cut is
+#    compared from where the surface is so far above the beginning of the shank: what touches the tool from there on
+#    knows nothing of it.
 # 2. At a given depth the body holds the energy $U_i(d)$ if it is indented, and with a cut it holds $U_c$ and has cost
 #    $G_c A$.  A crack cannot start before the sum $U_c + G_c A$ has fallen below $U_i$ (Fregonese and Bacca 2021): the
 #    work done until the puncture is at least that of the notched run at the same depth.
@@ -64,8 +68,7 @@ class Block:
         bond: Law of the crack.
         blade: The tool.
         damping: Kelvin–Voigt viscosity over Young's modulus.
-        depth: Depth of the tip at the end.
-        steady: Way before the end on which the cut is steady.
+        steady: Way on which steady cuts are compared.
         notch: Depth of the notch of the run that it is compared with.
         length: Length of each half.
         below: What is left of the block below the tip at the end.
@@ -77,7 +80,6 @@ class Block:
     bond: Exponential
     blade: Blade
     damping: float
-    depth: float
     steady: float
     notch: float
     length: float
@@ -88,6 +90,16 @@ class Block:
     def rule(self) -> MeshRule:
         """Sizes of the elements."""
         return MeshRule.of([self.blade], [self.bond])
+
+    @property
+    def settled(self) -> float:
+        """Depth of the tip from which on nothing is felt of the surface."""
+        return self.blade.shaft_height + self.length
+
+    @property
+    def depth(self) -> float:
+        """Depth of the tip at the end."""
+        return self.settled + self.steady
 
     @property
     def stiffness(self) -> float:
@@ -111,11 +123,11 @@ def blade(degrees: float, radius: float, half_thickness: float) -> Blade:
 
 GEL, GEL_BOND = NeoHookean(0.02, 0.45), Exponential(strength=0.03, toughness=0.015)
 STRIP, STRIP_BOND = NeoHookean(0.777, 0.45), Exponential(strength=0.3, toughness=0.1)
-SILICONE = Block("silicone", STRIP, STRIP_BOND, blade(20, 0.1, 0.4), 1e-3, 1.6, 0.3, 0.4, 1.2, 1.4)
+SILICONE = Block("silicone", STRIP, STRIP_BOND, blade(20, 0.1, 0.4), 1e-3, 0.3, 0.4, 1.2, 1.4)
 SHARP = replace(SILICONE, name="silicone, sharp", blade=blade(20, 0.05, 0.4))
 RUBBED = replace(SILICONE, name="silicone, friction 0.3", friction=0.3)
 BLOCKS = (
-    Block("gel", GEL, GEL_BOND, blade(15, 0.3, 0.75), 5e-4, 6.5, 0.6, 0.8, 5.0, 3.0),
+    Block("gel", GEL, GEL_BOND, blade(15, 0.3, 0.75), 5e-4, 0.6, 0.8, 5.0, 3.0),
     SILICONE,
     SHARP,
     RUBBED,
@@ -176,19 +188,21 @@ def push(block: Block, notch: float, out: Path) -> History:
 
 def found(block: Block, intact: History, notched: History) -> dict[str, float]:
     """What the two runs say."""
-    end = block.depth
+    start, end = block.settled, block.depth
     # on the shank the force may grow beyond that of the puncture
     peak = int(np.argmax(np.where(intact["front"] < 2 * block.blade.tip_radius, intact["force"], 0.0)))
-    steady = [SteadyCut.of(history, end - block.steady, end) for history in (intact, notched)]
+    steady = [SteadyCut.of(history, start, end) for history in (intact, notched)]
     works = [work_until(intact["depth"][peak], history) for history in (intact, notched)]
     lost = intact["energy_fracture"] + intact["energy_friction"] + intact["energy_viscous"]
-    viscous = np.diff(np.interp([end - block.steady, end], intact["depth"], intact["energy_viscous"]))[0] / block.steady
+    viscous = np.diff(np.interp([start, end], intact["depth"], intact["energy_viscous"]))[0] / block.steady
     expected = steady_force(block.bond.toughness + viscous, 1.0, block.stiffness)
     return {
         "depth of the puncture [mm]": float(intact["depth"][peak]),
         "force of the puncture over the toughness": float(intact["force"][peak] / block.bond.toughness),
         "least force after it over the peak": float((intact["force"][peak:] / intact["force"][peak]).min()),
         "steady force over that from a notch": steady[0].force / steady[1].force,
+        "drift of the steady force": steady[0].drift,
+        "drift of that from a notch": steady[1].drift,
         "steady force over the toughness": steady[0].force / block.bond.toughness,
         "steady force over closed form": float(steady[0].force / expected),
         "work until the puncture over that from a notch": works[0] / works[1],
