@@ -120,7 +120,7 @@ class Comparisons:
 
     def section(self) -> str:
         """The section of the page; empty if there are no problems."""
-        return "\n\n".join(text for problem in self.problems for text in (problem.what, self._table(problem)))
+        return "\n\n".join(text for problem in self.problems for text in (problem.what.strip(), self._table(problem)))
 
     def _table(self, problem: Problem) -> str:
         names = [f"{name} [{unit}]" if unit else name for name, unit in problem.unit.items()]
