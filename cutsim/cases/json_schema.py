@@ -10,8 +10,8 @@ from cutsim.cases.keys import SINGULAR
 from cutsim.cases.schema import CaseTables
 
 _NULL = {"type": "null"}
-#: What newer drafts call otherwise.
-_DRAFT_4 = {"$defs": "definitions", "prefixItems": "items"}
+#: What newer drafts call otherwise; and what tells alternatives apart need not be in a schema: "rule" is a text, too.
+_DRAFT_4 = {"$defs": "definitions", "prefixItems": "items", "oneOf": "anyOf"}
 
 
 class _Generator(GenerateJsonSchema):
