@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 _BEYOND, _ABOVE, _BESIDE = 0.15, 0.3, 0.05
 # cells along an edge of the grid on which a signed distance is sampled, by dimension
 _SAMPLES = {2: 240, 3: 56}
+# part of the grid by which a node on its outside may be off
+_SLIVER = 1e-9
 
 
 def prism(
@@ -217,9 +219,13 @@ class _Level:
         cells, kinds, points = plot.vtk_mesh(self._distance.function_space)
         flat = np.arange(3) >= gdim
         grid = pyvista.UnstructuredGrid(cells, kinds, np.where(flat, 0.0, box[0]) + points * np.where(flat, 0.0, size))
-        grid["distance"] = self._distance.x.array
-        # VTK's other algorithm crashes where the clip leaves a cell without volume
-        return grid.clip_scalar(scalars="distance", value=0.0).extract_surface(algorithm="geometry")
+        if gdim == 2:
+            grid["distance"] = self._distance.x.array
+            return grid.clip_scalar(scalars="distance", value=0.0).extract_surface(algorithm="dataset_surface")
+        # a clip leaves cells without volume, at which VTK crashes; a level does not, and here it is closed at the box
+        outer = np.any((points < _SLIVER) | (points > 1 - _SLIVER), axis=1)
+        grid["distance"] = np.where(outer, np.maximum(self._distance.x.array, size.max()), self._distance.x.array)
+        return grid.contour([0.0], scalars="distance")
 
 
 class _Triangulated:

@@ -9,7 +9,8 @@
 
 import logging
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -39,6 +40,7 @@ class Punctured:
         notch: Depth of the notch.
         width: Width of what the tool parts, above which the surface is no longer felt.
         ahead: Part of the whole cut that the front has swept at most when the surface gives way.
+        settings: What differs from the file of the case.
     """
 
     name: str
@@ -46,12 +48,22 @@ class Punctured:
     notch: float
     width: float
     ahead: float = 0.25
+    settings: Mapping[str, str] = field(default_factory=dict)
 
 
+ROUGH = {
+    "tool.friction": "0.2",
+    "insertion.faces.firm": "true",
+    "insertion.depth": "8 mm",
+    "mesh.set.deep": "9",
+    "mesh.set.H": "14",
+}
 ALL = (
     Punctured("ring", "puncture-ring", 0.3, 0.8),
     Punctured("slab", "puncture-slab", 0.3, 0.8),
     Punctured("skin", "puncture-skin", 0.3, 1.7),
+    # the hole of a needle is felt over some radii of it; friction on the shaft grows with the depth, in both runs alike
+    Punctured("needle", "puncture-needle", 0.3, 2.0, settings=ROUGH),
 )
 
 
@@ -96,7 +108,7 @@ class Push:
 def pushed(one: Punctured, notch: float, out: Path) -> Push:
     """Run a case with a notch or without one. Collective."""
     open_ = {"mesh.set.notch": f"{notch}", "insertion.notch": f"{notch}"} if notch else {}
-    simulation = read_case(built_in_cases()[one.case][1], open_).build(COMM)
+    simulation = read_case(built_in_cases()[one.case][1], {**one.settings, **open_}).build(COMM)
     cut = simulation.insertion
     assert cut is not None
 
