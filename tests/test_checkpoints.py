@@ -159,7 +159,8 @@ def test_a_resumed_run_is_the_uninterrupted_one(folder, first_ranks):
         if (comm := first_ranks[after]) is not None:
             everything = sliding(comm)
             assert Checkpoints(folder / str(before), everything).resume() == pytest.approx(middle)
-            same(whole, steps(everything, end), 1e-10 if before != after else 0.0)
+            # several ranks factorise by another package, and entropy is what is left of energies that cancel
+            same(whole, steps(everything, end), 1e-9 if before != after else 0.0)
         WORLD.barrier()
 
 

@@ -138,11 +138,25 @@ def found(one: Punctured, intact: Push, notched: Push) -> dict[str, float]:
         "steady force": steady[0].force,
         "steady force over that from a notch": steady[0].force / steady[1].force,
         **closed_form(cut, history, steady[0], start, end),
+        **parts(intact.history, notched.history, start, end),
         "drift of the steady force": steady[0].drift,
         "drift of that from a notch": steady[1].drift,
         "penetration over the size along the crack": float(history["penetration"].max() / size),
         "largest closure": float(np.abs(history["energy_closure"]).max()),
         "steps": float(len(history["depth"])),
+    }
+
+
+def parts(intact: History, notched: History, start: float, end: float) -> dict[str, float]:
+    """What does not depend on how deep the shaft is in the body, which friction tells: over the same from a notch."""
+    depths = np.linspace(start, end, 200)
+    tips, forces = (
+        np.array([np.interp(depths, h["depth"], h[name]) for h in (intact, notched)]) for name in ("tip_force", "force")
+    )
+    growth = [np.polyfit(depths, force, 1)[0] for force in forces]
+    return {
+        "force on the tip over that from a notch": float(tips[0].mean() / tips[1].mean()),
+        "growth of the force over that from a notch": float(growth[0] / growth[1]),
     }
 
 
