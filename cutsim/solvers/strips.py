@@ -229,11 +229,11 @@ class KeptFactor(LaggedPC):
         self.memory = float(factor.getMumpsInfog(16))
         if factor.getMumpsInfog(1) in _SHORT:
             self.trouble = f"its factor would need about {self.memory:.0f} MB on a rank"
-        entries = factor.getMumpsInfog(29)
-        entries = -1_000_000 * entries if entries < 0 else entries  # a number too large is told in millions
-        if entries:
-            # forward and backward substitution, a multiplication and an addition each
-            self.price = factor.getMumpsRinfog(3) / (SLOWNESS * 4 * entries)
+        whole, kept = (_number(factor.getMumpsInfog(i)) for i in (29, 35))
+        if kept:
+            # forward and backward substitution, a multiplication and an addition each; where blocks of low rank leave a
+            # part of the entries, they leave about its square of the operations, which are not counted (measured)
+            self.price = factor.getMumpsRinfog(3) * (kept / whole) ** 2 / (SLOWNESS * 4 * kept)
 
     def _free(self) -> None:
         super()._free()
@@ -241,6 +241,11 @@ class KeptFactor(LaggedPC):
         if self._matrix is not None:
             self._matrix.destroy()
             self._matrix = None
+
+
+def _number(told: int) -> int:
+    """A number as MUMPS tells it: one that is too large, in millions and negative."""
+    return -1_000_000 * told if told < 0 else told
 
 
 def create_lagged(
