@@ -30,7 +30,7 @@ def test_case_files_are_right(dim, tmp_path):
 
 
 def cut(run, seconds, status=0, **found):
-    good = {"verdict": "trusted", "closure": 1e-3, "penetration": {"crack_penetration": 0.1}}
+    good = {"verdict": "trusted", "closure": 1e-3, "penetration": {"crack_penetration": 0.1}, "cut": 2.0}
     return {
         "run": run,
         "class": "2-D, push, rough, notch",
@@ -43,7 +43,7 @@ def cut(run, seconds, status=0, **found):
 
 
 def test_a_summary_names_what_is_not_good():
-    rows = [cut("a", 10.0), cut("b", 12.0), cut("c", 25.0, closure=0.02), cut("d", 99.0, status=3)]
+    rows = [cut("a", 10.0), cut("b", 12.0), cut("c", 25.0, closure=0.02, cut=0.05), cut("d", 99.0, status=3)]
     rows.append(cut("e", 12.0, status=1, verdict="questionable", penetration={"notch_penetration": 0.6}))
     words = "\n".join(summary(rows))
     for finding in (
@@ -54,7 +54,7 @@ def test_a_summary_names_what_is_not_good():
         "trusted: e",
     ):
         assert finding in words
-    assert table(rows)[2] == "| 2-D, push, rough, notch | 5 | 4 | 3 | 3 | 12 | 2.0e-02 | 0.60 |"
+    assert table(rows)[2] == "| 2-D, push, rough, notch | 5 | 4 | 3 | 3 | 3 | 12 | 2.0e-02 | 0.60 |"
     assert table(rows)[-1].startswith("| all | 5 | 4 |")
 
 

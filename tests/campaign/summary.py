@@ -15,13 +15,16 @@ KEPT = Path(__file__).parent / "results"
 PAGE = Path(__file__).parents[2] / "docs" / "when_a_run_does_not_converge.md"
 #: Closure of the energy audit that is good, and time over the median of a class that is.
 CLOSURE, SLOW = 0.01, 2.0
+#: Growth of the crack from which a tool has cut and not only indented the body [mm].
+CUT = 0.1
 _ENDED = (Ending.TRUSTED, Ending.QUESTIONABLE)
 _BEGIN, _END = "<!-- campaign: begin -->\n", "<!-- campaign: end -->"
 _TITLES = (
     "cuts",
     "number",
     "to the end",
-    "of these trusted",
+    "of these have cut",
+    "trusted",
     "in twice the median",
     "median [s]",
     "closure",
@@ -89,6 +92,7 @@ def _cells(kind: str, rows: Sequence[Row], usual: dict[str, float]) -> tuple[str
         kind,
         str(len(rows)),
         str(len(done)),
+        str(sum(row["cut"] >= CUT for row in done)),
         str(sum(row["verdict"] == "trusted" for row in done)),
         str(sum(row["seconds"] <= SLOW * usual[row["class"]] for row in done)),
         f"{median(row['seconds'] for row in done):.0f}",

@@ -1,7 +1,7 @@
 """A double cantilever beam on a structured mesh of quadrilaterals, as arrays that any program can read.
 
 Plane strain, small strain: E = 200 GPa, ν = 0.3, arms of 1.5 mm, initial crack of 30 mm, bilinear bond with 0.28 N/mm,
-57 MPa and a stiffness of 1e5 N/mm³.  The ends are moved apart by 4 mm in 100 equal steps.  Both programs have the same
+57 MPa and a stiffness of 1e5 N/mm³.  The ends are moved apart by 4 mm in 100 equal steps.  All programs have the same
 nodes, the same elements of degree 1 with 2 × 2 points, and three points on each facet of the bond.
 """
 
