@@ -39,6 +39,8 @@ from cutsim.interface.viscous import ViscousBond
 FIELDS = ("damage", "strength_loss", "spent", "opening", "sliding", "pressure", "dissipated")
 # pressure over that of faces which look at each other that counts as none
 _ROUNDING = 1e-9
+# its contact knows no other partners than those that met at the start
+_CURE = "a stiffer contact is needed or, where they slide past each other, symmetric or sliding faces"
 
 
 class Crack(Term):
@@ -208,7 +210,7 @@ class Crack(Term):
     def watch(self) -> None:
         """Doubt faces that lie deep in each other. Collective."""
         blend = self.contact.blend / self.normal_size
-        doubt_penetration(self.state.verdict, self.name, self.penetration(), blend)
+        doubt_penetration(self.state.verdict, self.name, self.penetration(), blend, _CURE)
 
     def record(self) -> dict[str, tuple[float, str]]:
         """Broken area ∫ max(D_n, D_t) dΓ₀, largest opening, penetration over the normal mesh size. Collective."""

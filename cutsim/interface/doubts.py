@@ -35,7 +35,9 @@ def doubt_law(verdict: Verdict, name: str, law: CohesiveLaw, young: float, size:
         )
 
 
-def doubt_penetration(verdict: Verdict, name: str, depth: float, blend: float) -> None:
+def doubt_penetration(
+    verdict: Verdict, name: str, depth: float, blend: float, cure: str = "a stiffer contact is needed"
+) -> None:
     """Doubt a contact whose surfaces lie deep in each other.
 
     A blended contact p = ε (s − c) acts as if the surfaces were moved apart by its blend c, which does not count.
@@ -45,10 +47,11 @@ def doubt_penetration(verdict: Verdict, name: str, depth: float, blend: float) -
         name: Name of the contact.
         depth: Largest penetration over the mesh size normal to the surface [–].
         blend: Blend of the contact over the same [–].
+        cure: What helps.
     """
     if depth - blend > DEEP:
         verdict.doubt(
             f"{name}: penetration",
-            f"{name}: surfaces penetrate each other by {depth:.2g} of the mesh size: a stiffer contact is needed",
+            f"{name}: surfaces penetrate each other by {depth:.2g} of the mesh size: {cure}",
             depth,
         )
