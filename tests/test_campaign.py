@@ -3,7 +3,7 @@
 import pytest
 
 from campaign.draws import LARGEST, Draw
-from campaign.summary import PAGE, kept, page, summary, table
+from campaign.summary import PAGE, effort, kept, page, summary, table
 from cutsim.cases import read_case
 
 
@@ -30,7 +30,8 @@ def test_case_files_are_right(dim, tmp_path):
 
 
 def cut(run, seconds, status=0, **found):
-    good = {"verdict": "trusted", "closure": 1e-3, "penetration": {"crack_penetration": 0.1}, "cut": 2.0}
+    good = {"verdict": "trusted", "closure": 1e-3, "penetration": {"crack_penetration": 0.1}, "cut": 2.0, "depth": 3.0}
+    body = {"young": 1.0, "poisson": 0.0, "toughness": 0.5, "friction": 0.0}
     return {
         "run": run,
         "class": "2-D, push, rough, notch",
@@ -38,6 +39,7 @@ def cut(run, seconds, status=0, **found):
         "status": status,
         "seconds": seconds,
         **good,
+        **body,
         **found,
     }
 
@@ -52,10 +54,20 @@ def test_a_summary_names_what_is_not_good():
         "above 1%: c",
         "above 0.5 h: e",
         "trusted: e",
+        "cost less: c",
     ):
         assert finding in words
-    assert table(rows)[2] == "| 2-D, push, rough, notch | 5 | 4 | 3 | 3 | 3 | 12 | 2.0e-02 | 0.60 |"
+    assert table(rows)[2] == "| 2-D, push, rough, notch | 5 | 4 | 3 | 0 | 3 | 3 | 12 | 2.0e-02 | 0.60 |"
     assert table(rows)[-1].startswith("| all | 5 | 4 |")
+
+
+def test_a_cut_that_costs_more_than_the_indentation_is_not_expected():
+    """An indentation to 3 mm holds ¼ E · 3² = 2.25: 3 · 0.5 cost less, and with friction of 1.4 · 0.3 more."""
+    rows = [cut("a", 10.0, cut=0.0), cut("b", 10.0, cut=0.0, friction=0.3)]
+    assert effort(rows[0]) == pytest.approx(1.5 / 2.25) and effort(rows[1]) == pytest.approx(3 * 0.92 / 2.25)
+    assert "cost less: a" in "\n".join(summary(rows)) and table(rows)[2].startswith(
+        "| 2-D, push, rough, notch | 2 | 2 | 0 | 1 | 2 |"
+    )
 
 
 def test_the_page_has_the_table_of_the_results_that_are_kept():

@@ -99,8 +99,28 @@ def test_an_element_that_is_almost_flat():
     b = make_blocks(n=2)
     mechanics = moved(b, lambda t: -0.93 * t, contact=PenaltyContact(1e4))
     words = reasons(mechanics, step=0.05)
-    assert "body: an element is squeezed to" in words and "smaller ones, or those of degree 2, are needed" in words
+    assert "body: elements that are squeezed to" in words and "smaller ones, or those of degree 2, are needed" in words
     assert mechanics.terms[0].smallest_jacobian() < 0.1
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("share", [0.01, 0.04])
+def test_flat_elements_count_by_the_energy_that_they_hold(share):
+    """A layer of the upper block is squeezed to 0.05, the lower block sheared until the layer holds a share of W."""
+    n, squeezed, shear = 8, 0.05, E / (2 * (1 + NU))
+    lame = 2 * shear * NU / (1 - 2 * NU)
+    layer = 0.5 * shear * (squeezed**2 - 1) - shear * np.log(squeezed) + 0.5 * lame * np.log(squeezed) ** 2
+    slope = np.sqrt(layer / n * (1 / share - 1) / (0.5 * shear * 0.5))
+    b = make_blocks(n=n)
+    solid = b.solid(NeoHookean(E, NU))
+    b.move(
+        lambda x: np.stack([slope * x[1], 0 * x[1]]),
+        lambda x: np.stack([0 * x[1], -(1 - squeezed) * np.maximum(x[1] - (1 - 1 / n), 0)]),
+    )
+    solid.watch()
+    words = "squeezed to 0.05 of their volume hold 4.0% of the strain energy"
+    assert solid.smallest_jacobian() == pytest.approx(squeezed)
+    assert str(b.state.verdict) == "trusted" if share < 0.02 else words in str(b.state.verdict)
 
 
 @pytest.mark.parametrize(

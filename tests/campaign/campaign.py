@@ -30,12 +30,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     results = folder / "results.jsonl"
     rows = {row["run"]: row for row in read(results)}
-    for dim, number in ((2, options.plane), (3, options.space)):
+    for dim, number, seconds in ((2, options.plane, options.seconds), (3, options.space, options.space_seconds)):
         largest = options.unknowns if dim == 2 else LARGEST[3]
         for i in range(number):
             name = f"{dim}d-{i:03d}"
             if name not in rows:
-                rows[name] = _run(name, Draw.of(options.seed, i, dim, largest), folder, options.seconds)
+                rows[name] = _run(name, Draw.of(options.seed, i, dim, largest), folder, seconds)
                 with results.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(rows[name]) + "\n")
                 print(_line(rows[name]), flush=True)
@@ -50,7 +50,9 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--plane", type=int, default=200, metavar="N", help="cuts in the plane")
     parser.add_argument("--space", type=int, default=20, metavar="N", help="cuts in space")
     parser.add_argument("--unknowns", type=int, default=LARGEST[2], help="most unknowns in the plane, about")
-    parser.add_argument("--seconds", type=int, default=900, help="processor time at which a cut is ended")
+    limit = "processor time at which a cut in {} is ended"
+    parser.add_argument("--seconds", type=int, default=900, help=limit.format("the plane"))
+    parser.add_argument("--space-seconds", type=int, default=3600, help=limit.format("space"))
     parser.add_argument(
         "--keep", action="store_true", help="keep the results beside this file, and a table in the docs"
     )
@@ -89,13 +91,15 @@ def _found(files: RunFiles) -> dict[str, Any]:
     lost = {name: float(columns[f"energy_{name}"][-1]) for name in _LOST if f"energy_{name}" in columns}
     total = sum(map(abs, lost.values()))
     back = np.diff(columns["path"]) - np.diff(columns["time"])
+    deepest = int(columns["depth"].argmax())  # where the first push ends
     return {
         "verdict": files.summary.get("verdict"),
         "doubts": files.summary.get("kinds", []),
         "reasons": files.summary.get("reasons", []),
         "unknowns": files.summary.get("unknowns"),
         "time": float(columns["time"][-1]),
-        "depth": float(columns["depth"].max()),
+        "depth": float(columns["depth"][deepest]),
+        "work": float(columns["work_external"][deepest]),
         "cut": float(columns["cut"][-1]),
         "closure": float(np.abs(columns["energy_closure"]).max()),
         "penetration": {n: float(values.max()) for n, values in columns.items() if n.endswith("_penetration")},

@@ -132,6 +132,8 @@ class Draw:
         turning = "" if self.motion == "push" else f"turning_depth = {depth:g}\n"
         # drawn out: until it is where the push began
         start = 0.8 * notch
+        # on a path that leads back in time a rough tool would rub on its way back, which no real one does
+        path = "path = { facets = 0 }\n" if self.friction else ""
         end = {
             "push": f"depth = {depth:g}\n",
             "re-insert": f"depth = {depth:g}\npush = 2\n",
@@ -180,7 +182,7 @@ notch = {notch:g}
 first = 0.02
 largest = 0.1
 closure = 2e-3
-
+{path}
 [output]
 every = 0
 report = false

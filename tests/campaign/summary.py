@@ -17,6 +17,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "when_a_run_does_not_converge.md"
 CLOSURE, SLOW = 0.01, 2.0
 #: Growth of the crack from which a tool has cut and not only indented the body [mm].
 CUT = 0.1
+# work of an indentation by a depth d over E/(1 − ν²) d² and the length of the edge, the same in two pushes that cut
+# nothing (ν = 0.32 and 0.46); friction of a steady cut over μ E and the length of the edge, of a blade of 12° [mm]
+_INDENTED, _RUBBED = 0.25, 1.4
 _ENDED = (Ending.TRUSTED, Ending.QUESTIONABLE)
 _BEGIN, _END = "<!-- campaign: begin -->\n", "<!-- campaign: end -->"
 _TITLES = (
@@ -24,6 +27,7 @@ _TITLES = (
     "number",
     "to the end",
     "of these have cut",
+    "rightly indent",
     "trusted",
     "in twice the median",
     "median [s]",
@@ -50,6 +54,17 @@ def penetration(row: Row) -> float:
     return max(row["penetration"].values(), default=0.0)
 
 
+def effort(row: Row) -> float:
+    """What a cut to the depth of the tool costs, in new surface and friction, over the work of an indentation to it."""
+    cut = row["toughness"] + _RUBBED * row["friction"] * row["young"]
+    return float(cut / (_INDENTED * row["young"] / (1 - row["poisson"] ** 2) * row["depth"]))
+
+
+def rightly_indents(row: Row) -> bool:
+    """Whether a tool has not cut, and a cut would have cost more, about."""
+    return row["cut"] < CUT and effort(row) >= 1
+
+
 def medians(rows: Sequence[Row]) -> dict[str, float]:
     """Processor time of the cuts that have come to their end, by class [s]."""
     done = [row for row in rows if ended(row)]
@@ -70,6 +85,9 @@ def summary(rows: Sequence[Row]) -> Iterator[str]:
             f"with a closure above {CLOSURE:.0%}": [row for row in done if row["closure"] > CLOSURE],
             f"with a penetration above {DEEP:g} h": [row for row in done if penetration(row) > DEEP],
             "not trusted": [row for row in done if row["verdict"] != "trusted"],
+            "that do not cut, though it would cost less": [
+                row for row in done if row["cut"] < CUT and not rightly_indents(row)
+            ],
         }
         for words, found in findings.items():
             yield f"  {len(found)} {words}: {_names(found)}"
@@ -93,6 +111,7 @@ def _cells(kind: str, rows: Sequence[Row], usual: dict[str, float]) -> tuple[str
         str(len(rows)),
         str(len(done)),
         str(sum(row["cut"] >= CUT for row in done)),
+        str(sum(map(rightly_indents, done))),
         str(sum(row["verdict"] == "trusted" for row in done)),
         str(sum(row["seconds"] <= SLOW * usual[row["class"]] for row in done)),
         f"{median(row['seconds'] for row in done):.0f}",
