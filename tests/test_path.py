@@ -30,7 +30,7 @@ from cutsim.studies.fracture import CantileverBeams, crack_front, crack_length_c
 from helpers.bars import BONDS, FINE, SOFT, WIDTH, Bar
 from helpers.blocks import make_blocks
 from helpers.boxes import two
-from validation.snap_back import BUILD, UNTIL, Case, check, follow, judge_composite
+from validation.snap_back import UNTIL, Case, build, check, follow, judge
 
 # one law is enough on several ranks: the closed forms are the same on all
 ON_RANKS = {"exponential": [], "bilinear": [pytest.mark.mpi]}
@@ -247,8 +247,8 @@ def test_a_coarse_bilinear_beam_is_followed_to_its_end(pulled):
 def test_stiff_bonds_in_a_composite_beam_are_followed_on_coarse_facets(case, tmp_path):
     """Facets of six times the length that resolves the process zone; the force is that of beams all the same."""
     size = 0.25
-    rows, found = follow(BUILD[case](size, MPI.COMM_SELF), UNTIL[case], tmp_path, "beam")
-    check(case, size, found | judge_composite(rows))
+    rows, found = follow(build(case, size, comm=MPI.COMM_SELF), UNTIL[case], tmp_path, "beam")
+    check(case, size, found | judge(case, size, rows))
     assert found["newton"] < 3 * found["steps"]
 
 

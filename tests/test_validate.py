@@ -13,7 +13,7 @@ from cutsim.results.run_files import Column, RunFiles
 from cutsim.validation.page import MARK, keyed, page, with_excerpts
 from cutsim.validation.peers import OURS, Comparisons, Solution
 from cutsim.validation.readings import ReadingError, read_value
-from cutsim.validation.results import Findings, Level, judge
+from cutsim.validation.results import Findings, Level, judge, observed_order
 from cutsim.validation.rows import RowsError, read_rows
 from validation.peers import compare
 
@@ -163,6 +163,36 @@ def test_a_study_shows_its_order(checkout):
     result = judge(run, run.row[0], [level(force=5.4), level(force=5.1)], "today", quick=False)
     assert result.order == pytest.approx(2.0) and result.error == pytest.approx(0.02) and not result.inside
     assert result.values == (10.8, 10.2) and result.seconds == 2.0
+
+
+@pytest.mark.parametrize(
+    ("values", "order"),
+    [
+        ([1.4, 1.1], 2.0),  # of the errors
+        ([1.9, 1.5, 1.4], 2.0),  # of the differences, to a limit that is not the reference
+        ([0.8, 1.4, 1.1], None),  # differences that change their sign
+        ([1.1, 1.4, 1.9], None),  # or grow
+        ([9.0, 1.9, 1.5, 1.4], 2.0),
+        ([1.1, 1.4], None),  # no error that falls
+        ([1.1, None], None),
+        ([1.2, None, 1.1], None),
+        ([1.0, 1.0], None),
+    ],
+)
+def test_an_order_is_that_of_differences_or_errors_that_fall(values, order):
+    assert observed_order(values, 1.0, 2.0) == (order if order is None else pytest.approx(order))
+
+
+def test_a_program_makes_a_study_with_its_options(checkout):
+    text = ROWS.replace('program = "press"', 'program = "press"\nstudy = [{ coarser = 2 }, {}]\nrefinement = 4', 1)
+    (checkout / "tests/validation/rows/10-loads.toml").write_text(text)
+    program = PROGRAM.replace("{force} *", '(5 + 0.08 * ("--coarser" in sys.argv) + 0.02) *')
+    (checkout / "tests/validation/press.py").write_text(program.replace("{{", "{").replace("}}", "}"))
+    CliRunner().invoke(app, ["validate"])
+    force, _ = json.loads((checkout / "docs" / "validation" / "results.json").read_text())
+    assert force["values"] == [10.2, 10.04] and force["order"] == pytest.approx(np.log(5) / np.log(4))
+    result = CliRunner().invoke(app, ["validate", "--quick"])  # on the mesh of the quick program alone
+    assert result.exit_code == 0 and "11.044" in result.stdout
 
 
 def test_a_study_of_a_program_is_a_list_of_values(checkout):

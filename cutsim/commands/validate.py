@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -139,20 +139,31 @@ def _results(runs: Sequence[Run], folder: Path, jobs: int, *, quick: bool, scree
 
 
 def _jobs(run: Run, folder: Path, base: Path, *, quick: bool) -> list[_TimedJob]:
-    """The commands of a run, one for each level of its study; only the coarsest in a quick validation."""
+    """The commands of a run, one for each level of its study; in a quick validation only one."""
+    return [
+        _TimedJob(target, _command(run, changes, folder, target, quick=quick))
+        for changes, target in _levels(run, base, quick=quick)
+    ]
+
+
+def _levels(run: Run, base: Path, *, quick: bool) -> list[tuple[dict[str, Any], Path]]:
+    """Changes of each level, and its folder; of the coarsest only if quick, where a program has a mesh of its own."""
+    if quick:
+        return [({} if run.program else run.levels[0], base / run.name)]
+    several = len(run.levels) > 1
+    return [
+        (changes, base / (f"{run.name}-{number}" if several else run.name))
+        for number, changes in enumerate(run.levels, start=1)
+    ]
+
+
+def _command(run: Run, changes: dict[str, Any], folder: Path, target: Path, *, quick: bool) -> tuple[str, ...]:
     reduced = ["--quick"] if quick else []
     if run.program:
-        target = base / run.name
-        program = str(folder / f"{run.program}.py")
-        return [_TimedJob(target, (program, *run.arguments, *reduced, "--out", str(target)))]
-    levels = run.levels[:1] if quick else run.levels
-    found = list[_TimedJob]()
-    for number, changes in enumerate(levels, start=1):
-        target = base / (run.name if len(levels) == 1 else f"{run.name}-{number}")
-        sets = [part for key, value in changes.items() for part in ("--set", f"{key}={value}")]
-        arguments = ("-m", "cutsim", "run", run.case, *sets, *reduced, "-o", str(target), "--overwrite")
-        found.append(_TimedJob(target, arguments))
-    return found
+        options = [part for key, value in changes.items() for part in (f"--{key}", str(value))]
+        return (str(folder / f"{run.program}.py"), *run.arguments, *options, *reduced, "--out", str(target))
+    sets = [part for key, value in changes.items() for part in ("--set", f"{key}={value}")]
+    return ("-m", "cutsim", "run", run.case, *sets, *reduced, "-o", str(target), "--overwrite")
 
 
 def _write(groups: Sequence[Group], found: Sequence[Result], folder: Path, docs: Path) -> None:

@@ -1,6 +1,6 @@
 """The figure of the page on validation: how far rows are inside their tolerances, and how studies converge."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -30,9 +30,10 @@ def draw(path: Path, groups: Sequence[Group], found: Findings) -> None:
     colours = colormaps["tab20"].colors  # one for each group
     for number, group in enumerate(groups):
         results = [found.results[key] for key, _ in keyed([group]) if key in found.results]
+        ratios = {run.name: run.refinement for run in group.run}
         colour = colours[number % len(colours)]
         _shares(left, number, results, colour)
-        for sizes, errors in _studies(results):
+        for sizes, errors in _studies(results, ratios):
             right.loglog(sizes, errors, "o-", color=colour, markersize=3, linewidth=0.8)
     left.axvline(1.0, color="#c00")
     left.set_xscale("log")
@@ -44,7 +45,7 @@ def draw(path: Path, groups: Sequence[Group], found: Findings) -> None:
     sizes = np.array([0.25, 1.0])
     for order, style in ((1, ":"), (2, "--")):
         right.loglog(sizes, 0.3 * sizes**order, style, color="black", label=f"order {order}")
-    right.set_xticks([1.0, 0.5, 0.25], ["1", "1/2", "1/4"], minor=False)
+    right.set_xticks([1.0, 0.5, 0.25, 0.125], ["1", "1/2", "1/4", "1/8"], minor=False)
     right.set_xticks([], minor=True)
     right.legend()
     figure.savefig(path, dpi=120)
@@ -57,11 +58,11 @@ def _shares(axes: Axes, place: int, results: Sequence[Result], colour: tuple[flo
     axes.plot(shares, aside, "o", color=colour, markersize=4)
 
 
-def _studies(results: Sequence[Result]) -> Iterator[tuple[Array, Array]]:
-    """Sizes and errors of each study."""
+def _studies(results: Sequence[Result], ratios: Mapping[str, float]) -> Iterator[tuple[Array, Array]]:
+    """Sizes and errors of each study, with the ratio of neighbouring sizes of each run."""
     for result in results:
         if len(result.values) > 1 and None not in result.values:
             values = np.array(result.values, dtype=float)
             errors: Array = np.abs(values - result.expected) / abs(result.expected or 1.0)
             if errors.min() > _LEAST:
-                yield np.array([0.5**level for level in range(len(errors))]), errors
+                yield ratios[result.key.split("/")[0]] ** -np.arange(len(errors), dtype=float), errors

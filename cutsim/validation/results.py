@@ -7,6 +7,8 @@ from math import isfinite, log
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
+
 from cutsim.base.files import replace_file
 from cutsim.results.folder import SUMMARY
 from cutsim.results.run_files import RunFiles
@@ -48,9 +50,9 @@ class Result:
         expected: The reference.
         error: Relative error of the last value, or the absolute one where zero is expected; None without a value.
         tolerance: What is allowed of it.
-        order: Observed order in the size of mesh or step; None without a study.
+        order: `observed_order` of the values; None without a study, or where it shows none.
         reason: Why it is outside its tolerance or missing, in words; empty if it is inside.
-        trusted: Whether the run was trusted by its own verdict, or its program's checks have held.
+        trusted: Whether the level that counts was trusted by its own verdict, or its program's checks have held.
         seconds: Processor time of the run, all levels together [s].
         unknowns: Unknowns of the largest problem; None if it is not known.
         made: Versions, date and machine that it was made with.
@@ -96,8 +98,8 @@ def judge(run: Run, row: Row, levels: Sequence[Level], made: str, *, quick: bool
         reason = share if abs(error) > tolerance else ""
     return Result(
         key=f"{run.name}/{row.name}", values=tuple(values), expected=expected, error=error, tolerance=tolerance,
-        order=_order(values, expected, run.refinement), reason=reason,
-        trusted=all(level.status == 0 for level in levels), seconds=round(sum(level.seconds for level in levels), 2),
+        order=observed_order(values, expected, run.refinement), reason=reason,
+        trusted=levels[-1].status == 0, seconds=round(sum(level.seconds for level in levels), 2),
         unknowns=levels[-1].unknowns, made=made,
     )  # fmt: skip
 
@@ -116,12 +118,27 @@ def _values(value: str | list[str], levels: Sequence[Level]) -> tuple[list[float
     return values, reason
 
 
-def _order(values: Sequence[float | None], expected: float, ratio: float) -> float | None:
-    """Observed order of the last two levels; None where one is missing or meets the reference but for rounding."""
-    if len(values) < 2 or None in values[-2:]:
+def observed_order(values: Sequence[float | None], expected: float, ratio: float) -> float | None:
+    """Observed order in the size of mesh or step.
+
+    Of three levels or more it is that of the differences of the last three, which do not know the reference; of two,
+    that of their errors.
+
+    Args:
+        values: The values, from coarse to fine; None where one is missing.
+        expected: The reference.
+        ratio: Ratio of the sizes of neighbours.
+
+    Returns:
+        The order; None where differences or errors do not fall, or are of rounding.
+    """
+    known = [value for value in values[-3:] if value is not None]
+    if len(known) < max(2, min(len(values), 3)):
         return None
-    before, last = (abs(value - expected) / abs(expected or 1.0) for value in values[-2:] if value is not None)
-    return log(before / last) / log(ratio) if min(before, last) > _ROUNDING else None
+    falling = np.diff(known) if len(known) == 3 else np.abs(np.array(known) - expected)
+    before, last = (float(part) for part in falling / abs(expected or 1.0))
+    converges = before * last > 0 and abs(before) > abs(last) > _ROUNDING
+    return log(before / last) / log(ratio) if converges else None
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,8 @@ class Run(_Table):
         program: name of a validation program.
         set: Keys of the case that are changed.
         arguments: Arguments of the program.
-        study: Further changes, one table for each mesh or step, from the coarsest to the finest, which counts.
+        study: Further changes of the case or options of the program, one table for each mesh or step, from the coarsest
+            to the finest, which counts; a quick program has its own mesh and leaves them out.
         refinement: Ratio of the sizes of neighbours in the study.
         row: The rows.
     """
@@ -85,15 +86,15 @@ class Run(_Table):
             raise ValueError("give a case or a program, and not both")
         if self.case and self.arguments:
             raise ValueError("arguments are those of a program; a case has set")
-        if self.program and (self.set or self.study):
-            raise ValueError("set and study are those of a case; a program has arguments")
+        if self.program and self.set:
+            raise ValueError("set is that of a case; a program has arguments")
         if self.case and any(isinstance(row.value, list) for row in self.row):
             raise ValueError("a case has one value a run; its study makes several")
         return self
 
     @property
     def levels(self) -> list[dict[str, Any]]:
-        """Changes of the case for each of its runs, the one that counts last."""
+        """Changes of the case, or options of the program, for each of its runs, the one that counts last."""
         return [{**self.set, **further} for further in self.study or [{}]]
 
 

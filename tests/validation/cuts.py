@@ -76,9 +76,9 @@ def angles(quick: bool) -> dict[str, float]:
 TOUGHNESS, WIDTH, HALF_ANGLE, MU = 0.1, 0.2, np.radians(20), 0.2
 
 
-def steady_forces(ratio: float, friction: float | None) -> np.ndarray:
+def steady_forces(ratio: float, friction: float | None, size: float) -> np.ndarray:
     """Forces along push and slice, and friction work per push, over the width; walls hold the strip along the edge."""
-    sizes = {"dim": 3, "Lx": 1.0, "H": 4.5, "lc": 0.2, "band": 0.3, "growth": 1.6, "notch": 0.5, "B": WIDTH, "nz": 1}
+    sizes = {"dim": 3, "Lx": 1.0, "H": 4.5, "lc": size, "band": 0.3, "growth": 1.6, "notch": 0.5, "B": WIDTH, "nz": 1}
     domain = read_geo(geometry("block"), COMM, sizes, gdim=3)
     body = cracked_block(domain, SILICONE, Exponential(strength=0.3, toughness=TOUGHNESS), viscosity=VISCOSITY)
     blade = Blade(HALF_ANGLE, 0.2, 0.5, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
@@ -98,14 +98,20 @@ def steady_forces(ratio: float, friction: float | None) -> np.ndarray:
 
 
 def slices(quick: bool) -> dict[str, float]:
-    """Forces of a slice by three times the push, without and with friction, over the toughness."""
-    smooth = steady_forces(3.0, None)
-    found = {"smooth push": smooth[0] / TOUGHNESS, "smooth along": smooth[1] / TOUGHNESS}
-    if not quick:
-        plain, rough = steady_forces(0.0, MU), steady_forces(3.0, MU)
-        found["work less friction"] = (rough[0] + 3.0 * rough[1] - rough[2]) / TOUGHNESS
-        found["push over that without slice"] = rough[0] / plain[0]
+    """Works of a slice by three times the push over those of theory, without and with friction, for each mesh."""
+    found = {}
+    for size in (0.2,) if quick else (0.2, 0.1):
+        smooth = steady_forces(3.0, None, size)
+        found |= {f"smooth push, {size} mm": spent(*smooth), f"smooth along, {size} mm": smooth[1] / TOUGHNESS}
+        if not quick:
+            found[f"work less friction, {size} mm"] = spent(*steady_forces(3.0, MU, size))
     return found
+
+
+def spent(push: float, along: float, rubbed: float) -> float:
+    """What is left of a slice for the crack, with what the strip gives back, over the toughness of what is cut."""
+    strain = push * (1 - SILICONE.poisson**2) / (SILICONE.young * 2.0)
+    return (push * (1 + strain / 2) + 3.0 * along - rubbed) / (TOUGHNESS * (1 + strain))
 
 
 PROBLEMS = {"angles": angles, "slices": slices}

@@ -340,6 +340,7 @@ def main(
     case: Annotated[Case, typer.Option(help="specimen")] = Case.isotropic,
     dim: Annotated[int, typer.Option(min=2, max=3, help="2: plane strain; 3: half the width")] = 2,
     steps: Annotated[int | None, typer.Option(min=1, help="steps of the whole path")] = None,
+    coarser: Annotated[float, typer.Option(min=1, help="factor on the size of the elements along the crack")] = 1.0,
     quick: Annotated[bool, typer.Option("--quick", help="a shorter run")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/dcb"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
@@ -349,6 +350,7 @@ def main(
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
     claim_folder(out, COMM, overwrite=overwrite)
     specimen = (QUICK if quick else FULL)[case]
+    specimen = replace(specimen, size=coarser * specimen.size)
     if steps is not None:
         specimen = replace(specimen, step=specimen.turns[-1] / steps)
     beam = Beam.build(specimen, dim)

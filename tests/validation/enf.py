@@ -362,6 +362,7 @@ def main(
     friction: Annotated[
         list[float] | None, typer.Option(min=0.0, help="friction coefficient; give it several times to compare")
     ] = None,
+    coarser: Annotated[float, typer.Option(min=1, help="factor on the size of the elements along the crack")] = 1.0,
     quick: Annotated[bool, typer.Option("--quick", help="coarser, in fewer steps")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/enf"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
@@ -371,6 +372,7 @@ def main(
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
     claim_folder(out, COMM, overwrite=overwrite)
     specimen = QUICK if quick else FULL
+    specimen = replace(specimen, size=coarser * specimen.size)
     histories, results = {}, {}
     for mu in friction or (0.0, 0.3, 0.5):
         histories[mu] = grow(specimen, mu, out / f"friction_{mu:g}")

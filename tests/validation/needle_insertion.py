@@ -14,7 +14,7 @@
 
 import logging
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -88,6 +88,7 @@ def main(
     once: Annotated[bool, typer.Option("--once", help="do not draw the needle back and push it again")] = False,
     toughness: Annotated[float | None, typer.Option(help="G_c in N/mm")] = None,
     depth: Annotated[float | None, typer.Option(help="depth of the tip in mm")] = None,
+    coarser: Annotated[float, typer.Option(min=1, help="factor on the size of the elements along the crack")] = 1.0,
     quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/needle_insertion"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
@@ -98,6 +99,7 @@ def main(
     claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
     begun = time.perf_counter()
     setting = SETTINGS[dim, quick]
+    setting = replace(setting, mesh=setting.mesh | {"lc": coarser * setting.mesh["lc"]})
     end = depth or setting.depth
     law = Exponential(strength=setting.strength, toughness=toughness or setting.toughness)
     rough = friction if friction is not None else (0.1, 0.0)[dim - 2]
