@@ -76,7 +76,7 @@ def angles(quick: bool) -> dict[str, float]:
 TOUGHNESS, WIDTH, HALF_ANGLE, MU = 0.1, 0.2, np.radians(20), 0.2
 
 
-def steady_forces(ratio: float, friction: float | None, size: float) -> np.ndarray:
+def steady_forces(ratio: float, friction: float | None, size: float = 0.2) -> np.ndarray:
     """Forces along push and slice, and friction work per push, over the width; walls hold the strip along the edge."""
     sizes = {"dim": 3, "Lx": 1.0, "H": 4.5, "lc": size, "band": 0.3, "growth": 1.6, "notch": 0.5, "B": WIDTH, "nz": 1}
     domain = read_geo(geometry("block"), COMM, sizes, gdim=3)
