@@ -25,7 +25,8 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
 ]
-exclude_patterns = ["_build", "*.py", "figures", "validation/_*", "validation/peers", "**/__pycache__", "**/.ipynb_checkpoints"]
+exclude_patterns = ["_build", "*.py", "figures", "**/__pycache__", "**/.ipynb_checkpoints"]
+exclude_patterns += ["validation/_*", "validation/peers"]
 
 # demos/ and tests/validation/ are linked into this folder; their light scripts are shown as notebooks without running
 nb_custom_formats = {".py": "demo_reader.read"}
