@@ -123,7 +123,6 @@ def main(
     ] = None,
     heat: Annotated[bool, typer.Option("--heat", help="temperature of the cut faces, with friction")] = False,
     depth: Annotated[float | None, typer.Option(help="depth of the cut in mm")] = None,
-    coarser: Annotated[float, typer.Option(min=1, help="factor on elements along the crack and the tip")] = 1.0,
     quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/blade"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
@@ -133,13 +132,7 @@ def main(
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
     claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
     given = SETTINGS[dim, quick]
-    setting = replace(
-        given,
-        mesh=given.mesh | {"lc": coarser * given.mesh["lc"]},
-        radius=coarser * given.radius,
-        toughness=toughness or given.toughness,
-        depth=depth or given.depth,
-    )
+    setting = replace(given, toughness=toughness or given.toughness, depth=depth or given.depth)
     domain = read_geo(MESH, MPI.COMM_WORLD, setting.mesh, gdim=dim)
     values = friction or [0.0]
     curves: list[Curve] = []
