@@ -283,7 +283,7 @@ def test_the_checkpoint_of_another_problem_is_refused_by_name(folder):
     grown = problem(n=4)
     pace = grown.state.pace
     pace.set({"control": "", "size": 0.0})
-    refused(grown, "pace: control, size, smooth, path, turned, drag in place of")
+    refused(grown, "pace: control, size, smooth, path, turned, carrier in place of")
 
 
 @pytest.mark.mpi

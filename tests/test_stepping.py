@@ -148,9 +148,9 @@ def test_another_line_search_saves_the_step():
 
 
 @pytest.mark.parametrize(("problem", "doubted"), [(everything, True), (opening_blocks, False)])
-def test_the_smallest_step_is_doubted_where_no_brake_is_left(problem, doubted):
+def test_the_smallest_step_is_doubted_where_nothing_carries_on(problem, doubted):
     mechanics = problem()
-    assert (mechanics.brake is None) == doubted
+    assert all(carrier.obstacle for carrier in mechanics.carriers) == doubted
     Failing(mechanics, lambda call: call <= 2)
     report = run(mechanics, 0.2, StepControl(0.1, 0.1, smallest=0.05), stop=lambda report: True)
     assert report.cuts == 1 and report.dt == pytest.approx(0.05)

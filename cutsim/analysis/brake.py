@@ -1,14 +1,19 @@
-"""Brake that carries a run across a jump, where there is no equilibrium near by (docs/theory.md §5)."""
+"""Brake that carries a run across a jump: a drag on all nodes (docs/theory.md §5)."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cutsim.analysis.carriers import NodalResistance
 from cutsim.base.arrays import Array
-from cutsim.base.assembly import global_dot
 from cutsim.base.places import Places
+from cutsim.base.terms import Advising, Term, offering
 from cutsim.fields.state import State
 from cutsim.solvers.newton import NonlinearProblem
+
+# first and smallest step over the smallest one without a brake
+_FIRST, _SHORTEST = 2.0**-6, 2.0**-12
 
 
 @dataclass(frozen=True)
@@ -19,54 +24,73 @@ class _Known:
         forces: Its forces on the owned dofs [force].
         acts: Whether there are any.
         lost: Energy that it has taken so far [energy].
+        drag: Force on a node over its velocity, c [force·time/length].
+        shortest: Step below which it is given up [time].
     """
 
     forces: Array
     acts: bool = False
     lost: float = 0.0
+    drag: float = 0.0
+    shortest: float = 0.0
 
 
 class Brake:
-    """Drag on all nodes of a body, c times their velocity, in steps that nothing else carries.
+    """Drag on all nodes, c times their velocity: as strong in its first step as the body is stiff, it fades with time.
 
-    Where an equilibrium ends, as when a bond gives way under a blunt tip, the body moves to another one within no time.
-    What it sets free on that way inertia and viscosity would take; here the brake does, until the body rests again.
-    The states before and after are equilibria without it.  What it has taken is an entry of the energy audit, `braked`.
+    Inertia and viscosity would take what the body sets free; here the brake does.
 
     Args:
         problem: The solver.
         state: Displacement and time.
+        terms: Terms of the problem.
     """
 
-    def __init__(self, problem: NonlinearProblem, state: State) -> None:
-        self._problem, self._state = problem, state
-        at_rest = _Known(np.zeros(len(problem.fixed)))
+    name, entry = "brake", "braked"
+
+    def __init__(self, problem: NonlinearProblem, state: State, terms: Sequence[Term]) -> None:
+        self._state, self._loads = state, offering(terms, Advising)
+        self._resistance = NodalResistance(problem, state)
+        at_rest = _Known(self._resistance.forces)
         self._known = state.memory.value("mechanics: brake", at_rest, places=Places.owned(state.V))
 
     @property
-    def stiffness(self) -> float:
-        """Mean stiffness of a node at the present displacement, beside which a drag is weak or strong. Collective."""
-        return self._problem.resistance(np.empty((0, len(self._problem.fixed))))[1]
+    def obstacle(self) -> str | None:
+        """A given load: beyond the largest one there may be no other equilibrium in which a body comes to rest."""
+        return "a body may run away under a given load" if self._loads else None
 
-    def hold(self, drag: float) -> None:
-        """Let the drag act in the trial step, which has begun; 0 for none.
+    @property
+    def shortest(self) -> float:
+        """A fraction of the smallest step without it."""
+        return self._known.committed.shortest
 
-        Args:
-            drag: Force on a node over its velocity, c [force·time/length].
-        """
-        problem, state = self._problem, self._state
-        problem.drag = drag / float(state.dt.value) if drag else 0.0
-        problem.known -= problem.drag * state.u_old.x.array[: len(problem.known)]
+    def start(self, smallest: float, first: float) -> float:
+        """As strong as the mean stiffness of a node is in its first step. Collective."""
+        size = _FIRST * smallest
+        drag = size * self._resistance.scale
+        self._known.set(replace(self._known.committed, drag=drag, shortest=_SHORTEST * smallest))
+        return size
+
+    def begin(self) -> None:
+        """No drag in the trial step."""
+        self._resistance.begin()
+
+    def hold(self) -> None:
+        """Let the drag act in the trial step."""
+        still = np.zeros_like(self._known.committed.forces)
+        self._resistance.hold(still + self._known.committed.drag / float(self._state.dt.value), still)
 
     def evaluate(self) -> None:
         """Forces of the trial step, and what it has lost by their mean at its ends. Collective."""
-        drag, increment, old = self._problem.drag, self._state.increment, self._known.committed
-        if drag or old.acts:
-            forces = drag * increment
-            lost = global_dot(self._state.mesh.comm, 0.5 * (forces + old.forces), increment)
-            self._known.trial = _Known(forces, drag > 0, old.lost + lost)
+        old, acts = self._known.committed, self._resistance.acts
+        if acts or old.acts:
+            lost = old.lost + self._resistance.work(old.forces)
+            self._known.trial = replace(old, forces=self._resistance.forces, acts=acts, lost=lost)
 
-    @property
-    def lost(self) -> float:
-        """Energy that it has taken so far, in the trial state [energy]."""
-        return self._known.trial.lost
+    def rests(self) -> bool:
+        """Always: where steps are long, the drag has faded."""
+        return True
+
+    def energies(self) -> dict[str, float]:
+        """What it has taken."""
+        return {self.entry: self._known.trial.lost}

@@ -35,22 +35,24 @@ def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, visco
         verdict.suppose("viscosity", f"the viscosity takes {viscous / after.scale:.1%} of the work that is done")
 
 
-def warn_of_brake(before: EnergyAudit, after: EnergyAudit, time: float) -> None:
-    """Warn once of a brake that takes part in what is lost: where a run jumps this is what the body sets free."""
-    shares = [_braked_share(audit) for audit in (before, after)]
+def warn_of_jump(carrier: str, entry: str, before: EnergyAudit, after: EnergyAudit, time: float) -> None:
+    """Warn once of a carrier that takes part in what is lost: where a run jumps this is what the body sets free."""
+    shares = [_share(audit, entry) for audit in (before, after)]
     if shares[0] <= VISCOUS < shares[1]:
         logger.warning(
-            "the run jumps about time %.6g, where a brake takes more than %.0f %% of the energy that is lost so far; "
-            "see energy_braked",
+            "the run jumps about time %.6g, where %s takes more than %.0f %% of the energy that is lost so far; "
+            "see energy_%s",
             time,
+            carrier,
             100 * VISCOUS,
+            entry,
         )
 
 
-def _braked_share(audit: EnergyAudit) -> float:
-    braked = audit.entries["braked"]
-    lost = braked + audit.entries["fracture"] + audit.entries["friction"]
-    return braked / lost if lost > 0 else 0.0
+def _share(audit: EnergyAudit, entry: str) -> float:
+    taken = audit.entries[entry]
+    lost = taken + audit.entries["fracture"] + audit.entries["friction"]
+    return taken / lost if lost > 0 else 0.0
 
 
 def doubt_way_back(state: State, before: EnergyAudit, after: EnergyAudit) -> None:

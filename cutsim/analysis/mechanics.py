@@ -11,16 +11,17 @@ from dolfinx import cpp, la
 from numpy.typing import NDArray
 
 from cutsim.analysis.brake import Brake
-from cutsim.analysis.doubts import doubt_audit, doubt_way_back, warn_of_brake
+from cutsim.analysis.carriers import Carrier
+from cutsim.analysis.doubts import doubt_audit, doubt_way_back, warn_of_jump
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.equilibrium_path import EquilibriumPath
+from cutsim.analysis.jump_dynamics import JumpDynamics
 from cutsim.analysis.mobility import extent
 from cutsim.analysis.motion import Dynamic, Motion, QuasiStatic
 from cutsim.base.assembly import global_dot
 from cutsim.base.checks import require
 from cutsim.base.signatures import checked
 from cutsim.base.terms import (
-    Advising,
     Augmenting,
     Body,
     Bonded,
@@ -79,7 +80,7 @@ class Mechanics(Balance[Term, Support]):
     Attributes:
         supports: Prescribed displacements.
         motion: What a dynamic analysis adds.
-        brake: What carries a run across a jump; None with inertia, or with loads under which a body may run away.
+        carriers: What may carry a run across a jump; with inertia nothing has to.
 
     Raises:
         ValueError: There is no term, two terms or supports share a name, two solids share a cell, two supports
@@ -128,9 +129,9 @@ class Mechanics(Balance[Term, Support]):
         audit, rest = EnergyAudit(scale=max((i.facet_energy for i in interfaces), default=0.0)), 0 * state.increment
         self._audit = state.memory.value("mechanics: audit", audit)
         self._rate_forces = state.memory.value("mechanics: rate forces", rest, places=self._residual.places)
-        # beyond the largest load there may be no other equilibrium in which a body comes to rest
-        rests = self.inertia is None and not offering(terms, Advising)
-        self.brake = Brake(self.problem, state) if rests else None
+        static = self.inertia is None
+        kinds: tuple[type[Brake], type[JumpDynamics]] = (Brake, JumpDynamics)
+        self.carriers: tuple[Carrier, ...] = tuple(kind(self.problem, state, terms) for kind in kinds if static)
         self._resisted = state.memory.value("mechanics: viscous work, and what is not set free by the body", (0.0, 0.0))
         self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
@@ -171,7 +172,9 @@ class Mechanics(Balance[Term, Support]):
         super().begin()
         self.motion.begin()
         self.problem.known[:] = self.motion.known(self._residual.committed)
-        self.problem.drag = 0.0
+        self.problem.drag = None
+        for carrier in self.carriers:
+            carrier.begin()
 
     def predict(self) -> None:
         """Start the search for equilibrium where the last step leads; with inertia the velocity does so already."""
@@ -189,8 +192,8 @@ class Mechanics(Balance[Term, Support]):
         """Trial history, energies and reactions of the converged trial state. Collective."""
         for part in (*self.terms, *self._observers):
             part.evaluate()
-        if self.brake is not None:
-            self.brake.evaluate()
+        for carrier in self.carriers:
+            carrier.evaluate()
         old = self._residual.committed
         residual = self.motion.forces(self._out_of_balance(), old, self.problem.carried)
         rates = [forces for t in offering(self.terms, RateDependent) if (forces := t.rate_forces()) is not None]
@@ -212,8 +215,7 @@ class Mechanics(Balance[Term, Support]):
         return self.trial_audit.entries["fracture"] - self.audit.entries["fracture"]
 
     def _energies(self) -> list[dict[str, float]]:
-        braked = {} if self.brake is None else {"braked": self.brake.lost}
-        return [*(t.energies() for t in offering(self.terms, Energetic)), braked]
+        return [part.energies() for part in (*offering(self.terms, Energetic), *self.carriers)]
 
     @property
     def audit(self) -> EnergyAudit:
@@ -238,7 +240,8 @@ class Mechanics(Balance[Term, Support]):
         before, resisted = self._resisted.committed
         self._resisted.trial = (viscous, resisted + max(viscous - before - free, 0.0))
         doubt_audit(self.state.verdict, self.audit, self.trial_audit, self._resisted.trial[1])
-        warn_of_brake(self.audit, self.trial_audit, self.state.time)
+        for carrier in self.carriers:
+            warn_of_jump(carrier.name, carrier.entry, self.audit, self.trial_audit, self.state.time)
         doubt_way_back(self.state, self.audit, self.trial_audit)
 
     def reaction(self, held: Support) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 
 from cutsim.analysis.availability import Availability
-from cutsim.analysis.brake import Brake
+from cutsim.analysis.carriers import Carrier
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.base.checks import positive, require, require_number
@@ -50,9 +50,9 @@ class ThermoMechanics:
         """None: heat needs time to go on."""
 
     @property
-    def brake(self) -> Brake | None:
-        """Brake of the mechanics."""
-        return self.mechanics.brake
+    def carriers(self) -> tuple[Carrier, ...]:
+        """Those of the mechanics."""
+        return self.mechanics.carriers
 
     @property
     def terms(self) -> tuple[Term, ...]:

@@ -1,7 +1,7 @@
 """Loop over steps: each step is tried, accepted or rejected, and committed here and nowhere else.
 
 One step: begin → move tools and loads → solve → (failure: roll back, another line search, a smaller step, a step along
-the equilibrium path, a step with a brake) → trial history → accept or reject → commit, record.
+the equilibrium path, a step with what carries it across a jump) → trial history → accept or reject → commit, record.
 """
 
 import signal
@@ -13,6 +13,7 @@ from typing import Literal
 
 from mpi4py import MPI
 
+from cutsim.analysis.carriers import JUMPS, Carrier
 from cutsim.analysis.following import follow, followable, pace_after, unfollowed
 from cutsim.analysis.steps import (
     FOLLOWING,
@@ -45,8 +46,8 @@ _STRAYED = 1e-3
 _JUMPED = 0.02
 # corners that differ by less than this fraction of the smallest step are one
 _ROUNDING = 1e-6
-# first and smallest step with a brake over the smallest one without; iterations of an easy one, and the growth after it
-_FIRST, _BRAKED, _EASY, _RELEASE = 2.0**-6, 2.0**-12, 10, 2.0
+# iterations of an easy step across a jump, and the growth after it
+_EASY, _RELEASE = 10, 2.0
 # what the verdict says of a run that has not come to its end, until it goes on
 _ENDS = (INTERRUPTED, "ended")
 
@@ -69,6 +70,8 @@ class StepControl:
         line_searches: Line searches tried in turn for the same step; where steps may grow, the first one for half of
             it before. For tools the default is best; for cracks in stiff, slender bodies ("basic", "l2", "bt").
         path: How the equilibrium path is followed where no step in time succeeds.
+        jumps: What carries the run across a jump where neither step nor path leads on, tried in turn: "brake", a drag
+            on all nodes, which may not act under given loads; "dynamics", inertia, for which bodies need a density.
 
     Raises:
         ValueError: A value is outside its range.
@@ -84,6 +87,7 @@ class StepControl:
     closure: float | None = None
     line_searches: tuple[str, ...] = ("bt", "l2")
     path: PathFollowing = FOLLOWING
+    jumps: tuple[str, ...] = JUMPS
 
     def __post_init__(self) -> None:
         require_number("first", self.first, positive)
@@ -98,6 +102,8 @@ class StepControl:
         require_number("closure", self.closure, positive.or_none)
         known = len(self.line_searches) > 0 and set(self.line_searches) <= set(LINE_SEARCHES)
         require("line_searches", self.line_searches, known, f"at least one of {', '.join(LINE_SEARCHES)}")
+        once = set(self.jumps) <= set(JUMPS) and len(set(self.jumps)) == len(self.jumps)
+        require("jumps", self.jumps, once, f"some of {', '.join(JUMPS)}, each once, or none")
 
     @classmethod
     @checked
@@ -177,7 +183,8 @@ def run(
     """
     state = problem.state
     require_number("until", until, above(state.time_old, "the present time").or_inf)
-    problem.check()
+    if not state.pace.committed.carrier:  # which holds what is free to move for a while
+        problem.check()
     corners, report = [c for c in (*problem.corners, until) if c <= until], None
     if state.pace.committed.control != repr(control):
         state.pace.set(Pace(repr(control), control.first))
@@ -208,56 +215,75 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
     followed = bool(pace.path)
     if followed and (along := follow(problem, control, corner)) is not None:
         return _accept(problem, along, pace_after(problem, control, along))
-    size, cuts, drag = pace.size, 0, pace.drag
+    size, cuts, carrier = pace.size, 0, _carrier(problem, pace.carrier)
     while True:
         start = state.time_old
         end = corner if start + (1 + _SLIVER) * size >= corner else start + size
         # where the last step tells where the next one leads, a smaller one is the better help; but not in a jump
-        predict = pace.smooth and not (drag and cuts)
+        predict = pace.smooth and not (carrier and cuts)
         searches = control.line_searches[: 1 if predict and not cuts and control.first < control.largest else None]
-        tried = replace(_attempt(problem, control, end, searches, predict=predict, drag=drag), cuts=cuts)
+        tried = replace(_attempt(problem, control, end, searches, predict=predict, carrier=carrier), cuts=cuts)
         if tried.refusal is None:
-            return _accept_in_time(problem, control, replace(tried, corner=end == corner), size, drag)
+            return _accept_in_time(problem, control, replace(tried, corner=end == corner), size, carrier)
         state.rollback()
         size, cuts = control.next(tried), cuts + 1
         require("control.next(report)", size, size < tried.dt, f"less than {tried.dt:.6g} after a rejected step")
         logger.info("step to %.6g rejected (%s); next try %.3g", end, tried.refusal, size)
         # a step that fails is halved before, but not one that has jumped
         early = tried.outcome.converged or control.path.onset is not None or cuts > 1
-        if not (followed or drag) and (size < control.smallest or (early and _eager(problem, control))):
+        if not (followed or carrier) and (size < control.smallest or (early and _eager(problem, control))):
             followed = True
             if (along := follow(problem, control, corner)) is not None:
                 logger.info("from time %.6g the equilibrium path is followed", start)
                 return _accept(problem, replace(along, cuts=cuts + along.cuts), pace_after(problem, control, along))
-        if size < control.smallest and not drag and problem.brake is not None:
-            size = _FIRST * control.smallest
-            drag = size * problem.brake.stiffness
-            logger.info("from time %.6g a brake acts", start)
-        if size < control.smallest * (_BRAKED if drag else 1.0):
-            raise _no_step(problem, control, tried)
+        if size < (carrier.shortest if carrier else control.smallest):
+            carrier = _next_carrier(problem, control, carrier)
+            if carrier is None:
+                raise _no_step(problem, control, tried)
+            size = carrier.start(control.smallest, control.first)
+            logger.info("from time %.6g: %s, across a jump", start, carrier.name)
 
 
-def _accept_in_time(problem: Problem, control: Control, report: StepReport, size: float, drag: float) -> StepReport:
+def _carrier(problem: Problem, name: str) -> Carrier | None:
+    """What carries a problem across a jump, by its name; None if there is none of this name."""
+    return next((carrier for carrier in problem.carriers if carrier.name == name), None)
+
+
+def _next_carrier(problem: Problem, control: Control, last: Carrier | None) -> Carrier | None:
+    """The first one that may be used of those that the control names after the last one; None if there is none."""
+    names = control.jumps[control.jumps.index(last.name) + 1 :] if last else control.jumps
+    found = (_carrier(problem, name) for name in names)
+    return next((carrier for carrier in found if carrier and not carrier.obstacle), None)
+
+
+def _accept_in_time(
+    problem: Problem, control: Control, report: StepReport, size: float, carrier: Carrier | None
+) -> StepReport:
     """Commit a step in time; the next one follows the size that was asked for, not what was left before a corner."""
     state, start = problem.state, report.time - report.dt
-    if drag:
-        return _accept(problem, report, _pace_braked(problem, control, report, size, drag))
-    # with a brake the run would have gone on below it
-    if report.cuts and control.next(replace(report, refusal="")) < control.smallest and problem.brake is None:
+    if carrier:
+        return _accept(problem, report, _pace_carried(problem, control, report, size, carrier))
+    # carried across a jump the run would have gone on below it
+    at_end = _next_carrier(problem, control, None) is None
+    if report.cuts and control.next(replace(report, refusal="")) < control.smallest and at_end:
         state.verdict.doubt("smallest step", f"a step at time {start:.6g} needed the smallest size allowed")
     following = control.next(replace(report, dt=size))
     smooth, turned = not report.corner, state.pace.committed.turned
     return _accept(problem, report, Pace(repr(control), following, smooth=smooth, turned=turned))
 
 
-def _pace_braked(problem: Problem, control: Control, report: StepReport, size: float, drag: float) -> Pace:
-    """How a run goes on after a step with a brake: by longer ones, and without it when they are long again."""
-    turned = problem.state.pace.committed.turned
+def _pace_carried(problem: Problem, control: Control, report: StepReport, size: float, carrier: Carrier) -> Pace:
+    """How a run goes on after a step across a jump: by longer ones, and as before when they are long and it rests."""
+    turned, name = problem.state.pace.committed.turned, carrier.name
     size = grown(replace(report, dt=size), _RELEASE, _EASY)
-    if size >= control.first:
-        logger.info("at time %.6g the brake is released", report.time)
-        drag = 0.0
-    return Pace(repr(control), min(size, control.first), smooth=not report.cuts, turned=turned, drag=drag)
+    verdict, rests = problem.state.verdict, carrier.rests()
+    verdict.withdraw("motion")
+    if not rests:
+        verdict.suppose("motion", f"the body has not come to rest at time {report.time:.6g}, after a jump")
+    elif size >= control.first:
+        logger.info("from time %.6g: no more %s, the body rests", report.time, name)
+        name = ""
+    return Pace(repr(control), min(size, control.first), smooth=not report.cuts, turned=turned, carrier=name)
 
 
 def _accept(problem: Problem, report: StepReport, pace: Pace) -> StepReport:
@@ -271,7 +297,9 @@ def _accept(problem: Problem, report: StepReport, pace: Pace) -> StepReport:
 
 def _no_step(problem: Problem, control: Control, report: StepReport) -> StepError:
     """The end of a run in which no step succeeds."""
-    start, advice = problem.state.time_old, [unfollowed(problem, control), problem.advise()]
+    start, obstacles = problem.state.time_old, {carrier.name: carrier.obstacle for carrier in problem.carriers}
+    unused = [f"No {name} carries the run on: {why}" for name in control.jumps if (why := obstacles.get(name))]
+    advice = [unfollowed(problem, control), *unused, problem.advise()]
     problem.state.verdict.suppose("ended", f"no step succeeds from time {start:.6g} on", aloud=True)
     return StepError(
         f"no step from time {start:.6g} of {report.dt:.3g} or more succeeds "
@@ -280,15 +308,15 @@ def _no_step(problem: Problem, control: Control, report: StepReport) -> StepErro
 
 
 def _attempt(
-    problem: Problem, control: Control, end: float, searches: Sequence[str], *, predict: bool, drag: float
+    problem: Problem, control: Control, end: float, searches: Sequence[str], *, predict: bool, carrier: Carrier | None
 ) -> StepReport:
     """Solve the step to `end` by the first line search that does; the first one may start where the last step leads."""
     state = problem.state
     for retry, line_search in enumerate(searches):
         state.rollback()
         begin(problem, end)
-        if drag and problem.brake is not None:
-            problem.brake.hold(drag)
+        if carrier:
+            carrier.hold()
         predicted = predict and not retry
         if predicted:
             problem.predict()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from math import isfinite
 from typing import Protocol
 
-from cutsim.analysis.brake import Brake
+from cutsim.analysis.carriers import Carrier
 from cutsim.base.checks import nonnegative, positive, require_number
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
@@ -81,8 +81,8 @@ class Problem(Protocol):
         """Its equilibrium path; None if there is none without time. Collective."""
 
     @property
-    def brake(self) -> Brake | None:
-        """Its brake; None if it does not jump."""
+    def carriers(self) -> Sequence[Carrier]:
+        """What may carry a run across a jump; none if it does not jump."""
 
     @property
     def audit(self) -> Audit:
@@ -221,6 +221,10 @@ class Control(Protocol):
     @property
     def path(self) -> PathFollowing:
         """How the equilibrium path is followed where no step in time succeeds."""
+
+    @property
+    def jumps(self) -> tuple[str, ...]:
+        """What carries the run across a jump, by name and in turn, where neither step nor path leads on."""
 
     def accept(self, report: StepReport) -> str | None:
         """Why a step that was solved is not accepted, in words; None if it is."""

@@ -22,7 +22,7 @@ from cutsim.base.kinematics import Expr
 #: Entries of the energy audit; the external work equals their sum (docs/theory.md §6).
 ENTRIES = (
     "strain", "kinetic", "thermoelastic", "cohesive_stored", "contact",  # stored
-    "fracture", "friction", "viscous", "cohesive_viscous", "braked", "numerical",  # lost
+    "fracture", "friction", "viscous", "cohesive_viscous", "braked", "damped", "numerical",  # lost
 )  # fmt: skip
 
 #: Those of energy that bodies, bonds and contacts hold.

@@ -49,7 +49,7 @@ class Pace:
         smooth: Whether the last step tells where the next one leads.
         path: Size of the next step along the equilibrium path, 0 for a step in time [energy].
         turned: Whether the path had to be followed before.
-        drag: Force on a node over its velocity while a brake acts, else 0 [force·time/length].
+        carrier: Name of what carries the run across a jump; empty while nothing does.
     """
 
     control: str = ""
@@ -57,7 +57,7 @@ class Pace:
     smooth: bool = False
     path: float = 0.0
     turned: bool = False
-    drag: float = 0.0
+    carrier: str = ""
 
 
 class State:

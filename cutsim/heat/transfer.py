@@ -84,8 +84,9 @@ class HeatTransfer(Balance[HeatTerm, PrescribedTemperature]):
         """None: heat needs time to go on."""
 
     @property
-    def brake(self) -> None:
+    def carriers(self) -> tuple[()]:
         """None: heat does not jump."""
+        return ()
 
     @property
     def fields(self) -> Mapping[str, Expr]:

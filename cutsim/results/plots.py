@@ -32,6 +32,7 @@ ENERGIES = {
     "energy_viscous": ("viscous", "#999999"),
     "energy_cohesive_viscous": ("viscosity of the bond", "#66a61e"),
     "energy_braked": ("brake where the run jumped", "#a6761d"),
+    "energy_damped": ("damped motion where the run jumped", "#7570b3"),
     "energy_numerical": ("numerical", "#000000"),
 }
 

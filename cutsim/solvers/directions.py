@@ -106,7 +106,7 @@ class Directions:
         if not self._parts:
             return v
         here = self.nodes < self._owned
-        blocks = v.reshape(*v.shape[:-1], -1, self._gdim).copy()
+        blocks = v.reshape(*v.shape[:-1], v.shape[-1] // self._gdim, self._gdim).copy()
         blocks[..., self.nodes[here], :] = np.einsum("nij,...nj->...ni", axes[here], blocks[..., self.nodes[here], :])
         return blocks.reshape(v.shape)
 

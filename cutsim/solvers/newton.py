@@ -67,6 +67,7 @@ class NonlinearProblem:
         known: Owned nodal forces that are added to those of F, such as the share of the last step in a time
             integration scheme; zero at first.
         fixed: Which owned unknowns have a Dirichlet condition.
+        guided: Which owned dofs supports or rigid bodies move; of a node with axes of its own all of them.
         bcs: As above.
 
     Raises:
@@ -90,6 +91,7 @@ class NonlinearProblem:
         self._constants = set(F.constants())
         self._system = System(F, u, bcs, entity_maps, structure)
         self.known, self.fixed = self._system.forces.known, self._system.forces.fixed
+        self.guided = self._system.guided
         free_dropped(self._system.comm)
         # nothing that is prescribed has a reaction then: the residual at the start is the only force to compare with
         criteria = replace(criteria, by_start=criteria.by_start or not (bcs or structure.directions))
@@ -124,12 +126,12 @@ class NonlinearProblem:
         self._iterations.linear.use(kept.linear_solver)
 
     @property
-    def drag(self) -> float:
-        """Stiffness of a force at each dof against its displacement; none at first [force/length]."""
+    def drag(self) -> NDArray[np.float64] | None:
+        """Stiffness of a force at each owned dof against its displacement, alike along all axes of a node, or None."""
         return self._system.drag
 
     @drag.setter
-    def drag(self, drag: float) -> None:
+    def drag(self, drag: NDArray[np.float64] | None) -> None:
         self._system.drag = drag
 
     def solve(self, line_search: str | None = None) -> Outcome:

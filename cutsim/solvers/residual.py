@@ -27,7 +27,8 @@ class Residual:
     Attributes:
         n: Number of owned dofs.
         known: Owned forces that are added to those of the form.
-        drag: Stiffness against the displacement of each dof, whose forces are added, too [force/length].
+        drag: Stiffness against the displacement of each owned dof, whose forces are added, too; None for none
+            [force/length].
         fixed: Which owned unknowns have a Dirichlet condition ...
         held: ... and their indices.
     """
@@ -50,7 +51,7 @@ class Residual:
         self._r, self._g, self._lifted = (la.vector(*layout) for _ in range(3))
         self._added = owned_vector(*layout)
         self.known: Array = np.zeros(self.n)
-        self.drag = 0.0
+        self.drag: Array | None = None
         self.fixed: NDArray[np.bool_] = np.zeros(self.n, dtype=bool)
         for bc in self._bcs:
             dofs = bc.dof_indices()[0]
@@ -101,7 +102,9 @@ class Residual:
             for a in self._a:
                 fem.apply_lifting(r, [a], [bcs], [self._u.x.array], -1.0)
         self._r.scatter_reverse(la.InsertMode.add)
-        r[: self.n] += self.known + self.drag * self._u.x.array[: self.n]
+        r[: self.n] += self.known
+        if self.drag is not None:
+            r[: self.n] += self.drag * self._u.x.array[: self.n]
         if self._assemblers:
             self._add_assembled(lift)
         return r[: self.n]

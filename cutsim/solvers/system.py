@@ -106,12 +106,12 @@ class System:
         return comm
 
     @property
-    def drag(self) -> float:
-        """Stiffness against the displacement of each dof [force/length]."""
+    def drag(self) -> NDArray[np.float64] | None:
+        """Stiffness against the displacement of each owned dof, or None [force/length]."""
         return self.forces.drag
 
     @drag.setter
-    def drag(self, drag: float) -> None:
+    def drag(self, drag: NDArray[np.float64] | None) -> None:
         self.forces.drag = self.tangent.drag = drag
 
     @property
@@ -195,6 +195,15 @@ class System:
         carried = self.supported(v)
         carried[..., self._borders.tied] = v[..., self._borders.tied]
         return carried
+
+    @property
+    def guided(self) -> NDArray[np.bool_]:
+        """Which owned dofs supports or rigid bodies move; of a node with axes of its own all of them."""
+        guided = self.forces.fixed.copy()
+        guided[self._borders.tied] = True
+        nodes, rows = self.directions.nodes, guided.reshape(-1, self.V.dofmap.index_map_bs)
+        rows[nodes[nodes < len(rows)]] = True
+        return guided
 
     def restrained(self, motions: NDArray[np.float64]) -> NDArray[np.float64]:
         """The part of owned motions, one a row, that supports or rigid bodies hold."""

@@ -31,7 +31,8 @@ class Tangent:
 
     Attributes:
         A: The matrix.
-        drag: Stiffness that is added to the diagonal of the free rows.
+        drag: Stiffness that is added to the diagonal of the free rows, owned entries, alike along all axes of a node
+            that has its own; None for none [force/length].
     """
 
     def __init__(
@@ -44,7 +45,7 @@ class Tangent:
     ) -> None:
         self._a, self._V, self._symmetric, self._assemblers = tuple(a), V, symmetric, tuple(assemblers)
         self._directions = directions or Directions(V)
-        self.drag = 0.0
+        self.drag: NDArray[np.float64] | None = None
         pattern = compat.sparsity_pattern(self._a)
         pattern.finalize()
         if V.mesh.comm.size == 1:
@@ -109,14 +110,14 @@ class Tangent:
             self._sum.ptap(self._axes, result=self.A)
             rows = self._directions.held if held else self._directions.held[:0]
             self.A.zeroRowsColumns(rows + self.A.getOwnershipRange()[0])
-        if self.drag:
-            self._add_drag(bcs)
+        if self.drag is not None:
+            self._add_drag(bcs, self.drag)
         self.A.getDiagonal(self._diagonal)
 
-    def _add_drag(self, bcs: Sequence[fem.DirichletBC]) -> None:
+    def _add_drag(self, bcs: Sequence[fem.DirichletBC], drag: NDArray[np.float64]) -> None:
         self._mark_free(bcs)
         self._diagonal.array[self._directions.held] = 0.0
-        self._diagonal.scale(self.drag)
+        self._diagonal.array[:] *= drag
         self.A.setDiagonal(self._diagonal, PETSc.InsertMode.ADD_VALUES)
 
     def _assemble_forms(self, bcs: Sequence[fem.DirichletBC]) -> None:

@@ -20,7 +20,7 @@ from summary import keep, read, summary
 from cutsim.results.folder import HISTORY
 from cutsim.results.run_files import RunFiles
 
-_LOST = ("fracture", "friction", "viscous", "cohesive_viscous", "braked", "numerical")
+_LOST = ("fracture", "friction", "viscous", "cohesive_viscous", "braked", "damped", "numerical")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -43,11 +43,11 @@ class Bar:
 
     @classmethod
     def build(
-        cls, law=BONDS["exponential"], *, pulled=False, linked=False, viscosity=0.0, corners=(), comm=MPI.COMM_WORLD
+        cls, law=BONDS["exponential"], *, pulled=False, linked=False, corners=(), terms=(), comm=MPI.COMM_WORLD, **body
     ):
         b = narrow(comm)
         crack = b.crack(law, young=SOFT, normal="reference")
-        terms = [b.solid(LinearElastic(SOFT, 0.0), viscosity=viscosity), crack]
+        terms = [b.solid(LinearElastic(SOFT, 0.0), **body), crack, *(make(b) for make in terms)]
         supports = [Support(b.state, b.face(*at), axis) for at, axis in (((1, 0.0), 1), ((0, 0.0), 0), ((0, WIDTH), 0))]
         top = b.face(1, 1.0)
         if pulled:
@@ -63,7 +63,7 @@ class Bar:
     def state(self):
         return self.blocks.state
 
-    def run(self, until, path=FINE, stop=lambda _: False, step=0.05, closure=None):
+    def run(self, until, path=FINE, stop=lambda _: False, step=0.05, **control):
         """Times, openings, tractions of the bond at them, and the reports of the accepted steps."""
         rows = []
 
@@ -71,7 +71,7 @@ class Bar:
             opening = self.crack.points.maximum(self.crack.point_values("opening"))
             rows.append((report.time, opening, traction(self.crack.law, opening), report))
 
-        run(self.mechanics, until, StepControl(step, step, path=path, closure=closure), record, stop)
+        run(self.mechanics, until, StepControl(step, step, path=path, **control), record, stop)
         return (*map(np.array, list(zip(*rows, strict=True))[:3]), [row[3] for row in rows])
 
 
