@@ -13,17 +13,19 @@ pytest.register_assert_rewrite("helpers")
 
 def pytest_addoption(parser):
     """A run whose parameters were all tried on fewer ranks, or with another dolfinx, need not try them all again."""
-    parser.addoption("--thin", action="store_true", help="of each test, take its first and last set of parameters only")
+    ends = "of each test, take its last set of parameters only (1), or its first and last one (2)"
+    parser.addoption("--thin", type=int, choices=(1, 2), help=ends)
 
 
 def pytest_collection_modifyitems(config, items):
     """Leave out what `--thin` leaves out, the same on all ranks."""
-    if not config.getoption("thin"):
+    ends = config.getoption("thin")
+    if ends is None:
         return
     kept = []
     for _, sets in groupby(items, lambda item: (item.path, getattr(item, "originalname", item.name))):
-        first, *others = sets
-        kept += [first, *others[-1:]]
+        *others, last = sets
+        kept += [*others[: ends - 1], last]
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = kept
 
