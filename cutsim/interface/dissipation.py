@@ -22,8 +22,13 @@ _WEIGHTS = 1 / (30 * _P5(2 * _PLACES - 1) ** 2)
 _TOLERANCE = 1e-11
 # secant over its memory at which a bond is broken
 _BROKEN = 1e-16
-# halvings of a step: for a place on it, whose error enters the loss squared, and at the most for parts of the way
-_LOCATE, _HALVINGS = 40, 48
+# a place on the step, whose error enters the loss squared, is looked for among so many parts, and again in one of them
+_PARTS, _ROUNDS = 16, 10
+# halvings of parts of the way, at the most
+_HALVINGS = 48
+
+#: Which points fulfil a condition at fractions of the step, shape (points, places).
+Condition = Callable[[NDArray[np.intp], Array], NDArray[np.bool_]]
 
 
 @dataclass(frozen=True)
@@ -82,6 +87,9 @@ def losses(law: CohesiveLaw, way: Way, memory: Array) -> Array:
 def _loss(law: CohesiveLaw, way: Way, memory: Array, mode: int) -> Array:
     """Loss of one mode at points where it is below its memory at the end."""
 
+    def secants(points: NDArray[np.intp], s: Array) -> Array:
+        return np.asarray(law.secants(*way.of(points).at(s)[:2])[mode])
+
     def secant(s: Array) -> Array:
         return np.asarray(law.secants(*way.at(s[:, None])[:2])[mode])[:, 0]
 
@@ -93,26 +101,28 @@ def _loss(law: CohesiveLaw, way: Way, memory: Array, mode: int) -> Array:
         opening, sliding, rates = way.of(points).at(s)
         return np.asarray(law.secants(opening, sliding)[mode] * rates[mode])
 
-    start = _last(lambda s: secant(s) >= memory, len(memory))
+    start = _last(lambda points, s: secants(points, s) >= memory[points, None], len(memory))
     # a long step is cut where nothing is left of the bond: no point of the rule might meet what is before
-    end = _last(lambda s: secant(s) > _BROKEN * memory, len(memory))
+    end = _last(lambda points, s: secants(points, s) > _BROKEN * memory[points, None], len(memory))
     work = _integral(power, start, end, _TOLERANCE * (law.toughness, law.shear_toughness)[mode])
     left = np.where(end < 1.0, 0.0, stored(end, secant(end)))
     return np.maximum(work + stored(start, memory) - left, 0.0)
 
 
-def _last(holds: Callable[[Array], NDArray[np.bool_]], points: int) -> Array:
+def _last(holds: Condition, points: int) -> Array:
     """Where on the way a condition that holds at its start, if anywhere, ends to hold."""
-    low, high = np.zeros(points), np.full(points, 0.5**_LOCATE)
-    beyond, throughout = holds(high), holds(np.ones(points))
-    if not (beyond & ~throughout).any():  # the common case: from the start, or not in this step
-        return np.where(beyond, 1.0, 0.0)
-    high = np.where(beyond, 1.0, high)
-    for _ in range(_LOCATE):
-        middle = 0.5 * (low + high)
-        still = holds(middle)
-        low, high = np.where(still, middle, low), np.where(still, high, middle)
-    return np.where(throughout, 1.0, low)
+    every = np.arange(points)
+    beyond, throughout = (holds(every, np.full((points, 1), s))[:, 0] for s in (float(_PARTS) ** -_ROUNDS, 1.0))
+    last = np.where(throughout, 1.0, 0.0)
+    rows = np.flatnonzero(beyond & ~throughout)
+    low, size = np.zeros(rows.size), 1.0
+    for _ in range(_ROUNDS if rows.size else 0):  # none in the common case: from the start, or not in this step
+        size /= _PARTS
+        # calls cost more than points: all ends of parts at a time
+        still = holds(rows, low[:, None] + size * np.arange(1, _PARTS))
+        low += size * np.where(still.all(axis=1), _PARTS - 1, still.argmin(axis=1))
+    last[rows] = low
+    return last
 
 
 def _integral(power: Callable[[NDArray[np.intp], Array], Array], start: Array, end: Array, tolerance: float) -> Array:
