@@ -8,6 +8,7 @@ import pytest
 import ufl
 from mpi4py import MPI
 
+from cutsim.analysis import stepping
 from cutsim.analysis.mechanics import Mechanics
 from cutsim.analysis.stepping import Interrupted, StepControl, StepError, StepReport, begin, run
 from cutsim.base.terms import Energetic, Term, offering
@@ -241,6 +242,17 @@ def test_every_corner_is_met():
     steps = np.diff([0.0, *rows["time"]])
     assert steps.min() > 1e-3, "corners that differ by rounding are one"
     assert steps.max() <= 0.2 * 1.1
+
+
+def test_a_start_that_strays_is_given_up_but_not_the_size_of_the_step(monkeypatch):
+    """The step is solved anew from the last state, by the other line search, and none is cut."""
+    mechanics, control, reports = everything(), StepControl(0.05, 0.1, growth=1.1), []
+    watch = Failing(mechanics, lambda call: False)
+    monkeypatch.setattr(stepping, "drift", lambda problem: 1.0 if watch.calls == 2 else 0.0)
+    run(mechanics, 0.3, control, reports.append)
+    assert watch.searches[:4] == ["bt", "bt", "l2", "bt"]
+    assert not any(r.cuts for r in reports)
+    assert reports[1].dt == pytest.approx(control.next(reports[0]))
 
 
 def test_equal_steps_are_kept_by_another_line_search():

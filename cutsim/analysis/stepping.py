@@ -5,7 +5,7 @@ the equilibrium path, a step with what carries it across a jump) → trial histo
 """
 
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import FrameType
@@ -221,8 +221,8 @@ def _advance(problem: Problem, control: Control, corner: float) -> StepReport:
         end = corner if start + (1 + _SLIVER) * size >= corner else start + size
         # where the last step tells where the next one leads, a smaller one is the better help; but not in a jump
         predict = pace.smooth and not (carrier and cuts)
-        searches = control.line_searches[: 1 if predict and not cuts and control.first < control.largest else None]
-        tried = replace(_attempt(problem, control, end, searches, predict=predict, carrier=carrier), cuts=cuts)
+        once = predict and not cuts and control.first < control.largest
+        tried = replace(_attempt(problem, control, end, once=once, predict=predict, carrier=carrier), cuts=cuts)
         if tried.refusal is None:
             return _accept_in_time(problem, control, replace(tried, corner=end == corner), size, carrier)
         state.rollback()
@@ -308,11 +308,14 @@ def _no_step(problem: Problem, control: Control, report: StepReport) -> StepErro
 
 
 def _attempt(
-    problem: Problem, control: Control, end: float, searches: Sequence[str], *, predict: bool, carrier: Carrier | None
+    problem: Problem, control: Control, end: float, *, once: bool, predict: bool, carrier: Carrier | None
 ) -> StepReport:
-    """Solve the step to `end` by the first line search that does; the first one may start where the last step leads."""
+    """Solve the step to `end` by the first line search that does; the first one may start where the last step leads.
+
+    Once: a step whose first solve fails is not tried again.
+    """
     state = problem.state
-    for retry, line_search in enumerate(searches):
+    for retry, line_search in enumerate(control.line_searches):
         state.rollback()
         begin(problem, end)
         if carrier:
@@ -322,9 +325,11 @@ def _attempt(
             problem.predict()
         outcome = problem.solve(line_search)
         refusal = failure(problem, outcome)
-        if predicted and refusal is None and drift(problem) > _STRAYED:
+        # from the last state the same step leads on along the path: nothing is wrong with its size
+        strayed = predicted and refusal is None and drift(problem) > _STRAYED
+        if strayed:
             refusal = "the start from the last step's rate leads to another equilibrium"
-        if refusal is None:
+        if refusal is None or (once and not strayed):
             break
     tried = reported(problem, outcome, refusal)
     if refusal is None:
