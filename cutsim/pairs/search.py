@@ -13,7 +13,7 @@ from cutsim.pairs.outer_surface import Master, SlaveSurface, normals
 from cutsim.pairs.pairing import Array, Hits, Indices, near_facets, nearest, project
 
 #: Distance both surfaces may move before partners are looked for anew, as a fraction of the mean slave facet's size.
-MARGIN = 0.25
+MARGIN = 0.5
 #: Cosine between the normals of a point and of the facet nearest to it from which one does not stand across the other.
 FACING = 0.5
 #: Multiple of the margin beyond which, or if not finite, a displacement is no state to look for partners in.
