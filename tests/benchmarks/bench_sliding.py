@@ -63,16 +63,16 @@ def main() -> None:
     reports: list[StepReport] = []
     with measure(COMM) as usage:
         for end, step in ((1.0, 1 / 5), (2.0, 1 / 15)):
-            control = StepControl(first=step, largest=step, line_searches=("basic", "bt"))
+            control = StepControl(first=step, largest=step)
             run(mechanics, end, control, reports.append)
     if COMM.rank == 0:
         columns = {name: value for name, (value, _) in reports[-1].columns.items()}
-        print("   dofs  ranks  wall [s]  steps  cuts  Newton  Krylov  memory [GB]  closure  forces [N]")
+        print("   dofs  ranks  wall [s]  CPU [s]  steps  cuts  Newton  Krylov  memory [GB]  closure  forces [N]")
         print(
-            f"{state.unknowns:7d} {COMM.size:6d} {usage.wall:9.2f} {len(reports):6d}"
-            f" {sum(r.cuts for r in reports):5d} {sum(r.outcome.iterations for r in reports):7d}"
+            f"{state.unknowns:7d} {COMM.size:6d} {usage.wall:9.2f} {usage.cpu:8.2f}"
+            f" {len(reports):6d} {sum(r.cuts for r in reports):5d} {sum(r.outcome.iterations for r in reports):7d}"
             f" {sum(r.outcome.linear_iterations for r in reports):7d} {usage.memory:12.2f}"
-            f" {columns['energy_closure']:8.1e} {columns['top_x_force']:7.4f} {-columns['top_z_force']:7.4f}"
+            f" {columns['energy_closure']:8.1e} {columns['top_x_force']:7.4f} {-columns['top_z_force']:7.4f}\n{usage}"
         )
 
 
