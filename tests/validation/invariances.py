@@ -5,15 +5,21 @@
 # - in five systems of units, from metres and pascals to micrometres and kilopascals,
 # - in a body that is turned by 30° and in one that is mirrored,
 # - on 1, 2 and 3 MPI ranks,
+# - with another version of dolfinx, whose curve is kept in `other_version.json`; in an environment of that version
+#   `python -m cutsim.commands.launch -n 1 tests/validation/invariances.py --save tests/validation/other_version.json`
+#   makes it anew,
 # - if the run is stopped half way, and goes on from its checkpoint in a new problem.
 #
 # What is compared is the largest difference of the force at a step, over the largest force.
 
+import json
 import subprocess
 import sys
+from datetime import date
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import dolfinx
 import numpy as np
 from _problems import solve
 from mpi4py import MPI
@@ -32,10 +38,12 @@ from cutsim import (
     read_geo,
     run,
 )
+from cutsim.base.versions import petsc_version
 
 COMM = MPI.COMM_WORLD
 DEPTH = 1.6  # [mm]
 CONTROL = StepControl(first=0.05, largest=0.05)
+OTHER = Path(__file__).with_name("other_version.json")
 
 # ## The cut
 
@@ -106,10 +114,10 @@ def ranks(quick: bool) -> dict[str, float]:
     curves = []
     with TemporaryDirectory() as folder:
         for number in (1, 2, 3):
-            out = Path(folder, f"{number}.npy")
+            out = Path(folder, f"{number}.json")
             command = ["-m", "cutsim.commands.launch", "-n", str(number), __file__, "--save", str(out)]
             subprocess.run([sys.executable, *command], check=True, stdout=subprocess.DEVNULL)
-            curves.append(np.load(out))
+            curves.append(np.array(json.loads(out.read_text(encoding="utf-8"))["force"]))
     return {f"{number} ranks": difference(curves[0], curves[number - 1]) for number in (2, 3)}
 
 
@@ -132,12 +140,24 @@ def resumed(quick: bool) -> dict[str, float]:
     return {"difference": difference(plain, np.array(rest))}
 
 
-PROBLEMS = {"units": units, "turned": turned, "partition": ranks, "resumed": resumed}
+def versions(quick: bool) -> dict[str, float]:
+    """Largest difference from the curve of another version of dolfinx, to half of the depth."""
+    other = json.loads(OTHER.read_text(encoding="utf-8"))
+    return {"difference": difference(curve(insertion(), depth=DEPTH / 2), np.array(other["force"]))}
+
+
+def save(path: Path) -> None:
+    """Write the curve to half of the depth, and what has made it. Collective."""
+    forces = curve(insertion(), depth=DEPTH / 2)
+    made = {"dolfinx": dolfinx.__version__, "PETSc": petsc_version(), "date": date.today().isoformat()}
+    if COMM.rank == 0:
+        path.write_text(json.dumps(made | {"force": list(forces)}, indent=1) + "\n", encoding="utf-8")
+
+
+PROBLEMS = {"units": units, "turned": turned, "partition": ranks, "resumed": resumed, "versions": versions}
 
 if __name__ == "__main__":
-    if "--save" in sys.argv:  # one of the ranks
-        forces = curve(insertion(), depth=DEPTH / 2)
-        if COMM.rank == 0:
-            np.save(sys.argv[-1], forces)
+    if "--save" in sys.argv:  # one of the ranks, or another version
+        save(Path(sys.argv[-1]))
     else:
         solve("invariances", PROBLEMS)
