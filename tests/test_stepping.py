@@ -255,6 +255,16 @@ def test_a_start_that_strays_is_given_up_but_not_the_size_of_the_step(monkeypatc
     assert reports[1].dt == pytest.approx(control.next(reports[0]))
 
 
+def test_a_step_that_jumps_from_the_last_state_is_cut(monkeypatch):
+    """The start from the last step's rate misses some energy, that from the last state more: the step is too long."""
+    mechanics, control, reports = everything(), StepControl(0.05, 0.1, growth=1.1), []
+    watch = Failing(mechanics, lambda call: False)
+    monkeypatch.setattr(stepping, "drift", lambda problem: {2: 0.1, 3: 0.2}.get(watch.calls, 0.0))
+    run(mechanics, 0.3, control, reports.append)
+    assert watch.searches[:4] == ["bt", "bt", "l2", "bt"]
+    assert [r.cuts for r in reports[:2]] == [0, 1]
+
+
 def test_equal_steps_are_kept_by_another_line_search():
     mechanics = everything()
     watch = Failing(mechanics, lambda call: call == 2)

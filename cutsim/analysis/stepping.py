@@ -42,6 +42,8 @@ logger = collective_logger(__name__)
 _SLIVER = 0.1
 # change of the audit's relative closure at which a predicted step is thought to have strayed to another equilibrium
 _STRAYED = 1e-3
+# ratio of two such changes within which they are those of one equilibrium
+_SAME = 1.01
 # part of its loss that a step may miss in the energy audit, beyond which it has jumped
 _JUMPED = 0.02
 # corners that differ by less than this fraction of the smallest step are one
@@ -312,9 +314,10 @@ def _attempt(
 ) -> StepReport:
     """Solve the step to `end` by the first line search that does; the first one may start where the last step leads.
 
-    Once: a step whose first solve fails is not tried again.
+    Once: a step whose first solve fails is not tried again, and after a start which has strayed it must miss no more
+    than that did.
     """
-    state = problem.state
+    state, allowed = problem.state, _STRAYED
     for retry, line_search in enumerate(control.line_searches):
         state.rollback()
         begin(problem, end)
@@ -325,11 +328,12 @@ def _attempt(
             problem.predict()
         outcome = problem.solve(line_search)
         refusal = failure(problem, outcome)
-        # from the last state the same step leads on along the path: nothing is wrong with its size
-        strayed = predicted and refusal is None and drift(problem) > _STRAYED
+        # what misses as much from both starts is the same equilibrium, by a long step
+        strayed = refusal is None and (predicted or once) and (missed := drift(problem)) > allowed
         if strayed:
-            refusal = "the start from the last step's rate leads to another equilibrium"
-        if refusal is None or (once and not strayed):
+            start, allowed = "the last step's rate" if predicted else "the last state", _SAME * missed
+            refusal = f"the start from {start} leads to another equilibrium"
+        if refusal is None or (once and not (predicted and strayed)):
             break
     tried = reported(problem, outcome, refusal)
     if refusal is None:
