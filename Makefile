@@ -38,13 +38,13 @@ validation: $(STAMP) ## run a validation program: NAME=blade QUICK=1 ARGS="--fri
 validate: $(STAMP) ## run what compares results with references, and make its page: ARGS="--quick", "--only dcb"
 	.venv/bin/cutsim validate -j $(JOBS) $(ARGS)
 
-test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those marked mpi on 2 and 3 ranks
+test: $(STAMP) ## run all tests on one rank, JOBS=2 files at a time, then those marked mpi on 2 ranks, and those that compare ranks on 3
 	scripts/run -n 1 -m pytest -n $(JOBS) --dist loadfile --durations 20 tests $(ARGS)
 	@$(MAKE) --no-print-directory test-mpi
 
-test-mpi: $(STAMP) ## run the tests marked mpi on 2 and 3 ranks, with two sets of parameters of each and one
-	scripts/run -n 2 -m pytest -x -q -p no:cacheprovider -m mpi --thin 2 --durations 12 tests $(ARGS)
-	scripts/run -n 3 -m pytest -x -q -p no:cacheprovider -m mpi --thin 1 --durations 12 tests $(ARGS)
+test-mpi: $(STAMP) ## run the tests marked mpi on 2 ranks, and on 3 those that compare ranks, with two sets of parameters of each
+	scripts/run -n 2 -m pytest -x -q -p no:cacheprovider -m mpi --thin --durations 12 tests $(ARGS)
+	scripts/run -n 3 -m pytest -x -q -p no:cacheprovider -m mpi -k rank --thin --durations 12 tests $(ARGS)
 
 campaign: $(STAMP) ## run random cuts, or go on with them: SEED=2 ARGS="--plane 50 --space 0"; writes results/campaign
 	$(PYTHON_IN_VENV) tests/campaign/campaign.py --seed $(or $(SEED),1) $(ARGS)

@@ -13,19 +13,17 @@ pytest.register_assert_rewrite("helpers")
 
 def pytest_addoption(parser):
     """A run whose parameters were all tried on fewer ranks, or with another dolfinx, need not try them all again."""
-    ends = "of each test, take its last set of parameters only (1), or its first and last one (2)"
-    parser.addoption("--thin", type=int, choices=(1, 2), help=ends)
+    parser.addoption("--thin", action="store_true", help="of each test, take its first and last set of parameters only")
 
 
 def pytest_collection_modifyitems(config, items):
     """Leave out what `--thin` leaves out, the same on all ranks."""
-    ends = config.getoption("thin")
-    if ends is None:
+    if not config.getoption("thin"):
         return
     kept = []
     for _, sets in groupby(items, lambda item: (item.path, getattr(item, "originalname", item.name))):
-        *others, last = sets
-        kept += [*others[: ends - 1], last]
+        first, *others = sets
+        kept += [first, *others[-1:]]
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = kept
 
