@@ -401,6 +401,8 @@ def check(case: Case, which: float, found: dict[str, float]) -> None:
     if case in OPENED:
         assert found["distance_from_beam"] < 0.015
         assert 0.92 < found["peak_over_sharp_crack"] < 1.03
+    if case in (Case.composite, Case.rigid):
+        assert 61 < found["peak_force"] < 65
     if case in BENT:
         assert abs(found["largest_over_onset"] - 1) < 0.08
     if case is Case.mixed:
