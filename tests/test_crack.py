@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -108,9 +109,9 @@ LOOPS = {
 ENVELOPES = {Exponential: exponential, Bilinear: bilinear, ParkPaulinoRoesler: ppr, Polynomial: polynomial}
 
 
-@pytest.mark.parametrize("gdim", [2, 3])
-@pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    ("law", "loop", "gdim"), [*product(LAWS, LOOPS, [2]), *product(LAWS, ["mixed", "pressed sliding"], [3])]
+)
 def test_two_boxes_follow_the_law(law, loop, gdim):
     law, scale = LAWS[law].law, LAWS[law].scale
     envelope = ENVELOPES.get(type(law), own)

@@ -1,5 +1,7 @@
 """Taylor's theorem for every tangent: the remainder of the linearised forces falls with the square of the step."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -32,7 +34,7 @@ KINDS = [(3, "strain"), (2, "strain"), (2, "stress")]
 )
 def test_hyperelastic(material, gdim, plane):
     b = make_blocks(gdim)
-    for volumetric in ("full", "reduced"):
+    for volumetric in ("full",) if gdim == 3 else ("full", "reduced"):
         solid = b.solid(material, plane=plane, volumetric=volumetric)
         assert_slope_two(solid, b.state, smooth(b.state.V, 1, 0.2), 1.0)
 
@@ -110,9 +112,14 @@ STATES = {
 }
 
 
-@pytest.mark.parametrize("normal", ["current", "reference"])
-@pytest.mark.parametrize("gdim", [2, 3])
-@pytest.mark.parametrize("case", STATES)
+@pytest.mark.parametrize(
+    ("case", "gdim", "normal"),
+    # in space the terms are the same, but for the second direction of the slip
+    [
+        *product(STATES, [2], ["current", "reference"]),
+        *product(["slip", "slip while the bond breaks"], [3], ["current"]),
+    ],
+)
 def test_friction_on_a_crack(case, gdim, normal):
     friction, law, jump = STATES[case]
     sliding, opening, past = {**JUMPS, "breaking under compression": (2.6, -0.3, 1.0)}[jump]
@@ -146,10 +153,13 @@ def test_friction_on_an_intact_bond(acts_on):
 FRICTIONS = {"smooth": None, "regularised": FRICTION, "slip": Coulomb(0.3, 1e3), "stick": Coulomb(50.0, 5.0)}
 
 
-@pytest.mark.parametrize("friction", FRICTIONS.values(), ids=FRICTIONS)
-@pytest.mark.parametrize("shape", TOOLS)
+@pytest.mark.parametrize(
+    ("shape", "friction"),
+    [*product(TOOLS, ["regularised"]), *product(["blade", "plane", "sphere"], ["smooth", "slip", "stick"])],
+)
 def test_tool_on_outer_surface(shape, friction):
-    shape, place = TOOLS[shape]
+    """Every shape with one friction, every friction with three shapes: of a shape a friction knows its normal only."""
+    (shape, place), friction = TOOLS[shape], FRICTIONS[friction]
     gdim = len(place)
     b = make_blocks(gdim)
     surface = Surface.exterior(b.state, b.face(gdim - 1, 1.0))

@@ -26,7 +26,7 @@ from cutsim.fields.temperature import Temperature
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack import Crack
 from cutsim.interface.friction import Coulomb
-from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean, StVenantKirchhoff
+from cutsim.materials.elastic import IsochoricNeoHookean, LinearElastic, NeoHookean
 from cutsim.materials.rubbers import MooneyRivlin, Ogden
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
@@ -212,7 +212,6 @@ def test_incompressible_bar(cell, axisymmetric):
 MATERIALS = {
     "logarithm": NeoHookean(E, 0.4),
     "linear in J": Ogden((0.7, 0.2), (2.0, -1.5), 3.0),
-    "Green–Lagrange": StVenantKirchhoff(E, 0.4),
     "small strain": LinearElastic(E, 0.4),
 }
 
@@ -370,7 +369,7 @@ def test_double_cantilever_of_a_rubber(cell):
     assert J() == pytest.approx(3 * stiffness * opening**2 / (a + chi * h), rel=0.01)
 
 
-RHEOLOGIES = {"elastic": {}, "viscous": {"viscosity": 0.7}, "relaxing": {"relaxation": Prony((0.5,), (0.3,))}}
+RHEOLOGIES = {"viscous": {"viscosity": 0.7}, "relaxing": {"relaxation": Prony((0.5,), (0.3,))}}
 
 
 @pytest.mark.mpi

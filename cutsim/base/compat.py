@@ -29,8 +29,6 @@ from cutsim.base.jit import JIT_OPTIONS, compiled
 
 _VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 _BEFORE_0_10 = _VERSION < (0, 10)
-# cells from which forms are compiled in parts
-_IN_PARTS = 3_000
 
 #: For each further mesh of a form, the map between its cells and the entities of the mesh integrated over.
 EntityMaps = Mapping[Mesh, Any]
@@ -146,29 +144,6 @@ def _counted(form: ufl.Form) -> ufl.Form:
             for integral in form.integrals()
         ]
     )
-
-
-def forms(whole: ufl.Form, *, entity_maps: EntityMaps | None = None) -> list[fem.Form]:
-    """Compile a UFL form in parts, one for each kind of domain, if that pays. Collective on the mesh of the form.
-
-    To every kernel dolfinx passes a row of values of all coefficients of its form, so that cells would carry those of
-    the interfaces: on a large mesh much memory is written in vain at every assembly. On a small one it matters less
-    than a compilation more.
-
-    Args:
-        whole: As for `form`.
-        entity_maps: As for `form`.
-
-    Returns:
-        The parts, whose sum is the form.
-    """
-    mesh = whole.ufl_domain().ufl_cargo()
-    if _BEFORE_0_10 or mesh.topology.index_map(mesh.topology.dim).size_global < _IN_PARTS:
-        return [form(whole, entity_maps=entity_maps)]
-    parts: dict[str, list[ufl.Integral]] = {}
-    for integral in whole.integrals():
-        parts.setdefault(integral.integral_type(), []).append(integral)
-    return [form(ufl.Form(integrals), entity_maps=entity_maps) for integrals in parts.values()]
 
 
 def sparsity_pattern(forms: Sequence[fem.Form]) -> SparsityPattern:

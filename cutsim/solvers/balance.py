@@ -93,7 +93,7 @@ class Balance(Generic[T, H]):
         self._constraints.check(state.time)
         v = ufl.TestFunction(unknown.function_space)
         self.problem = NonlinearProblem(
-            sum((_residual(t, v) for t in terms), start=ufl.Form([])),
+            [_residual(t, v) for t in terms],
             unknown,
             bcs=[h.bc for h in held if h.bc is not None],
             entity_maps={mesh: entities for t in terms for mesh, entities in t.entity_maps.items()},

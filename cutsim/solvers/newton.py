@@ -52,7 +52,8 @@ class NonlinearProblem:
     1e-14 ||diag(K)|| (max |u| + h). Displacement and energy are judged, too, if they have a tolerance.
 
     Args:
-        F: Residual, linear in a test function of the space of u: internal minus external virtual work.
+        F: Residual, linear in a test function of the space of u: internal minus external virtual work; or its parts,
+            whose sum counts. Each part is compiled by itself, and only once for all problems in which it stands.
         u: The unknown; start and result of a solve.
         petsc_options_prefix: Prefix of all PETSc options of this problem; not empty, and its own.
         bcs: Dirichlet conditions. Their values may change between solves, their dofs may not.
@@ -76,7 +77,7 @@ class NonlinearProblem:
 
     def __init__(
         self,
-        F: ufl.Form,
+        F: ufl.Form | Sequence[ufl.Form],
         u: fem.Function,
         *,
         petsc_options_prefix: str,
@@ -88,8 +89,9 @@ class NonlinearProblem:
     ) -> None:
         self._options = Options(petsc_options_prefix, petsc_options or {})
         self.bcs = list(bcs)
-        self._constants = set(F.constants())
-        self._system = System(F, u, bcs, entity_maps, structure)
+        parts = [F] if isinstance(F, ufl.Form) else F
+        self._constants = {constant for part in parts for constant in part.constants()}
+        self._system = System(parts, u, bcs, entity_maps, structure)
         self.known, self.fixed = self._system.forces.known, self._system.forces.fixed
         self.guided = self._system.guided
         free_dropped(self._system.comm)

@@ -55,7 +55,7 @@ class System:
     start: the displacement comes first, along the axes of the nodes, then the multipliers, then borders.
 
     Args:
-        F: Residual, linear in a test function of the space of u.
+        F: Parts of the residual, linear in a test function of the space of u.
         u: The displacement.
         bcs: Dirichlet conditions.
         entity_maps: Entity maps of the forms.
@@ -73,15 +73,17 @@ class System:
 
     def __init__(
         self,
-        F: ufl.Form,
+        F: Sequence[ufl.Form],
         u: fem.Function,
         bcs: Sequence[fem.DirichletBC],
         entity_maps: compat.EntityMaps | None,
         structure: Structure,
     ) -> None:
         self._u, self._bcs, self.structure = u, list(bcs), structure
-        J = ufl.derivative(F, u, ufl.TrialFunction(u.function_space))
-        L, a = (compat.forms(form, entity_maps=entity_maps) for form in (F, J))
+        parts = [part for part in F if not part.empty()]
+        du = ufl.TrialFunction(u.function_space)
+        tangents = [ufl.derivative(part, u, du) for part in parts if u in part.coefficients()]
+        L, a = ([compat.form(part, entity_maps=entity_maps) for part in of] for of in (parts, tangents))
         self.directions = structure.directions or Directions(u.function_space)
         self.forces = Residual(L, a, u, bcs, structure.assemblers, self.directions)
         self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers, self.directions)
