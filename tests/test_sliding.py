@@ -93,8 +93,7 @@ def test_displacement_that_is_not_finite():
 
 
 @pytest.mark.parametrize(("two_pass", "tolerance"), [(False, 0.02), (True, 0.005)], ids=["one pass", "two passes"])
-@pytest.mark.parametrize("degree", [1, 2])
-@pytest.mark.parametrize(("gdim", "simplices"), [(2, False), (2, True), (3, False), (3, True)])
+@pytest.mark.parametrize(("gdim", "simplices", "degree"), ELEMENTS)
 def test_patch(gdim, simplices, degree, two_pass, tolerance):
     b = two(gdim, n=(4, 5), simplices=simplices, degree=degree)
     pair = b.pair(two_pass=two_pass)

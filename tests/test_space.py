@@ -374,4 +374,4 @@ def test_what_a_form_was_compiled_for_is_freed(tmp_path):
 
     held = compiled()
     gc.collect()
-    assert held() is None and list(tmp_path.glob("*.so")), "it was compiled, and nothing keeps it"
+    assert held() is None and list(tmp_path.rglob("*.so")), "it was compiled, and nothing keeps it"

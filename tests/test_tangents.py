@@ -29,7 +29,7 @@ KINDS = [(3, "strain"), (2, "strain"), (2, "stress")]
 
 @pytest.mark.parametrize(
     ("material", "gdim", "plane"),
-    [(m, *kind) for m in HYPERELASTIC for kind in KINDS if not (isinstance(m, MooneyRivlin) and kind[1] == "stress")],
+    [(m, 2, "strain") for m in HYPERELASTIC] + [(HYPERELASTIC[0], 2, "stress"), (HYPERELASTIC[-1], 3, "strain")],
     ids=lambda v: type(v).__name__ if v in HYPERELASTIC else v,
 )
 def test_hyperelastic(material, gdim, plane):

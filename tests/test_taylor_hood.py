@@ -92,7 +92,6 @@ def test_bodies_have_pressures_of_their_own():
 TOUCH = PenaltyContact(40.0, blend=0.02)
 KINDS = {
     "P2/P1": (TRIANGLE, False),
-    "Q2/Q1": (QUADRILATERAL, False),
     "axisymmetric": (QUADRILATERAL, True),
     "P2/P1 in 3-D": (TETRAHEDRON, False),
 }

@@ -108,11 +108,13 @@ def form(
         form_compiler_options: Options of FFCx.
 
     Returns:
-        The compiled form.
+        The compiled form, in one of many folders: to load a kernel, and more so to compile one, Python looks through
+        all files of its folder.
     """
-    options = {**JIT_OPTIONS, **(jit_options or {})}
-    maps = dict(entity_maps or {})
     counted = _counted(form)
+    options = {**JIT_OPTIONS, **(jit_options or {})}
+    options["cache_dir"] = str(Path(options["cache_dir"]) / counted.signature()[:2])
+    maps = dict(entity_maps or {})
     return compiled(
         form.ufl_domain().ufl_cargo().comm,
         lambda: fem.form(

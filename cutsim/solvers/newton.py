@@ -52,8 +52,7 @@ class NonlinearProblem:
     1e-14 ||diag(K)|| (max |u| + h). Displacement and energy are judged, too, if they have a tolerance.
 
     Args:
-        F: Residual, linear in a test function of the space of u: internal minus external virtual work; or its parts,
-            whose sum counts. Each part is compiled by itself, and only once for all problems in which it stands.
+        F: Residual, or its parts, linear in a test function of the space of u: internal minus external virtual work.
         u: The unknown; start and result of a solve.
         petsc_options_prefix: Prefix of all PETSc options of this problem; not empty, and its own.
         bcs: Dirichlet conditions. Their values may change between solves, their dofs may not.

@@ -55,7 +55,8 @@ class System:
     start: the displacement comes first, along the axes of the nodes, then the multipliers, then borders.
 
     Args:
-        F: Parts of the residual, linear in a test function of the space of u.
+        F: Parts of the residual, linear in a test function of the space of u. Each is compiled by itself, and only once
+            for all problems in which it stands.
         u: The displacement.
         bcs: Dirichlet conditions.
         entity_maps: Entity maps of the forms.
@@ -84,6 +85,8 @@ class System:
         du = ufl.TrialFunction(u.function_space)
         tangents = [ufl.derivative(part, u, du) for part in parts if u in part.coefficients()]
         L, a = ([compat.form(part, entity_maps=entity_maps) for part in of] for of in (parts, tangents))
+        # what vanishes, such as a term times zero, has no integrals once it is compiled
+        L, a = ([form for form in of if form.integral_types] for of in (L, a))
         self.directions = structure.directions or Directions(u.function_space)
         self.forces = Residual(L, a, u, bcs, structure.assemblers, self.directions)
         self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers, self.directions)
