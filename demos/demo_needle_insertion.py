@@ -58,14 +58,15 @@ block = cracked_block(domain, silicone, bond, viscosity=0.005, axisymmetric=True
 
 # ## Two insertions
 #
-# With a `turning_depth` the needle turns there, goes back to the notch, and is pushed in a second time.
+# With a `turning_depth` the needle turns there, goes back to the notch, and is pushed in a second time.  A step that
+# misses more than a thousandth of the energy is taken back and made shorter.
 
 from cutsim import Drive, Insertion, Recording, StepControl, run
 
 drive = Drive(speed=1.0, entry_time=1.0, turning_depth=depth)  # mm/s, s, mm
 cut = Insertion.build(block, needle, drive, notch=notch, friction=friction)
 until = cut.time_of(depth, push=2)
-control = StepControl(first=0.02, largest=0.1, smallest=1e-4)
+control = StepControl(first=0.02, largest=0.1, smallest=1e-4, closure=1e-3)
 stress = {"cauchy_stress": block.solids[0].cauchy_stress(block.state.u)}
 options = dict(show={"depth": "depth", "force": "force"}, extra=cut.columns, derived=stress, overwrite=True)
 with Recording("results/needle_insertion", cut.mechanics, until, title="needle", **options) as recording:
