@@ -148,6 +148,22 @@ def _counted(form: ufl.Form) -> ufl.Form:
     )
 
 
+def forms(parts: Sequence[ufl.Form], *, entity_maps: EntityMaps | None = None) -> list[fem.Form]:
+    """Compile the parts of a sum one by one, as one form where dolfinx, before 0.10, makes patterns of one form only.
+
+    Args:
+        parts: On one mesh; some may be empty.
+        entity_maps: As for `form`.
+
+    Returns:
+        Compiled forms with the same sum. What vanishes, such as a part times zero, is not among them.
+    """
+    if _BEFORE_0_10:
+        return [form(sum(parts, start=ufl.Form([])), entity_maps=entity_maps)]
+    found = [form(part, entity_maps=entity_maps) for part in parts if not part.empty()]
+    return [part for part in found if part.integral_types]
+
+
 def sparsity_pattern(forms: Sequence[fem.Form]) -> SparsityPattern:
     """Pattern of the sum of bilinear forms on the same spaces, not finalised."""
     first, *further = forms

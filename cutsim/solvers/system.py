@@ -81,12 +81,9 @@ class System:
         structure: Structure,
     ) -> None:
         self._u, self._bcs, self.structure = u, list(bcs), structure
-        parts = [part for part in F if not part.empty()]
         du = ufl.TrialFunction(u.function_space)
-        tangents = [ufl.derivative(part, u, du) for part in parts if u in part.coefficients()]
-        L, a = ([compat.form(part, entity_maps=entity_maps) for part in of] for of in (parts, tangents))
-        # what vanishes, such as a term times zero, has no integrals once it is compiled
-        L, a = ([form for form in of if form.integral_types] for of in (L, a))
+        tangents = [ufl.derivative(part, u, du) for part in F if u in part.coefficients()]
+        L, a = (compat.forms(parts, entity_maps=entity_maps) for parts in (F, tangents))
         self.directions = structure.directions or Directions(u.function_space)
         self.forces = Residual(L, a, u, bcs, structure.assemblers, self.directions)
         self.tangent = Tangent(a, u.function_space, structure.symmetric, structure.assemblers, self.directions)
