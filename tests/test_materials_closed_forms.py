@@ -349,7 +349,7 @@ def test_fung_in_shear():
 # -- finite elements --------------------------------------------------------------------------------------------------
 
 
-# in the plane all three stretches are there as well, but no fibre leaves it; three more are in test_tangents
+# in the plane all three stretches are there as well, but no fibre leaves it; a rubber in space is in test_tangents
 SPATIAL = [m for m in MATERIALS if isinstance(m, TransverselyIsotropic | Orthotropic | Reinforced)]
 
 
