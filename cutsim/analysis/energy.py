@@ -66,6 +66,11 @@ class EnergyAudit:
         return self.initial + self.external - sum(self.entries.values())
 
     @property
+    def freed(self) -> float:
+        """What bodies, bonds and contacts do not hold: what is lost by now, or in motion [energy]."""
+        return sum(value for name, value in self.entries.items() if name not in STORED) + self.entries["kinetic"]
+
+    @property
     def closure(self) -> float:
         """What is missing over the largest turnover so far [–]."""
         return self.gap / self.scale if self.scale > 0 else 0.0

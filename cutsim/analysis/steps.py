@@ -29,6 +29,10 @@ class Audit(Protocol):
     def closure(self) -> float:
         """What is missing, relative to the largest turnover so far [–]."""
 
+    @property
+    def freed(self) -> float:
+        """What is lost by now, or in motion; nothing of what is only exchanged."""
+
 
 class Path(Protocol):
     """Protocol of the equilibrium path of a problem, on which time may go back.

@@ -66,6 +66,11 @@ class HeatAudit:
         return sum(self.entries[name] for name in GAINED) - sum(self.entries[name] for name in SPENT)
 
     @property
+    def freed(self) -> float:
+        """Nothing: heat is only exchanged [energy]."""
+        return 0.0
+
+    @property
     def closure(self) -> float:
         """What is missing over the largest turnover so far [–]."""
         return self.gap / self.scale if self.scale > 0 else 0.0
