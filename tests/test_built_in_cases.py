@@ -33,7 +33,17 @@ COMM = MPI.COMM_WORLD
 CASES = {name: path for name, (_, path) in built_in_cases().items()}
 #: The kernels of these take long to compile. Lessons or other tests run the same bodies, laws and tools, and the
 #: validation runs most of the cases themselves.
-LONG = {"blade", "needle-gel", "puncture-slab", "skin", "skin-needle", "slice-push", "tear", "tear-bar"}
+LONG = {
+    "blade",
+    "needle-gel",
+    "puncture-needle-3d",
+    "puncture-slab",
+    "skin",
+    "skin-needle",
+    "slice-push",
+    "tear",
+    "tear-bar",
+}
 
 
 class Enough(Exception):
