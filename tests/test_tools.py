@@ -4,17 +4,33 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import ufl
 from scipy.optimize import minimize
 
 from cutsim.base.rotations import rotation_matrix
 from cutsim.tools.needle_tips import BevelNeedle, HollowNeedle
 from cutsim.tools.pointed import Blade, Needle
 from cutsim.tools.shapes import Ball, FlatPunch, Plane, ToolPath
+from helpers.blocks import make_blocks
 from helpers.examples import TOOLS
-from helpers.tools import values
+from helpers.tools import FRICTION, touch, values
 
 HALF, R, SHANK = 0.4, 0.3, 0.9  # half angle, tip radius, half thickness of the blade
 BLADE = Blade(HALF, R, SHANK)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_another_blade_needs_no_other_kernel(dim):
+    """Angle, radius, thickness and half are given to kernels, and both faces of a crack have one."""
+
+    def signature(sign, half_angle, side):
+        b = make_blocks(dim)
+        push, lateral = np.eye(dim)[0], np.eye(dim)[1]
+        blade = Blade(half_angle, half_angle / 4, half_angle, tuple(push), tuple(lateral), side=side)
+        tool = touch(b, blade, [0.5] * dim, [b.crack(None).surface(sign)], FRICTION)
+        return tool.residual(ufl.TestFunction(b.state.V)).signature()
+
+    assert signature("+", 0.2, -1) == signature("-", 0.4, 1)
 
 
 def dense(corners, n=4000):

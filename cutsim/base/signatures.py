@@ -109,7 +109,8 @@ def _is_array(value: Any, parts: tuple[Any, ...]) -> bool:
 
 def _members(protocol: type) -> set[str]:
     bases = [base for base in protocol.__mro__ if getattr(base, "_is_protocol", False)]
-    return {name for base in bases for name in vars(base) if not name.startswith("_")}
+    names = {name for base in bases for name in (*vars(base), *inspect.get_annotations(base))}
+    return {name for name in names if not name.startswith("_")}
 
 
 def _words(hint: Any) -> str:

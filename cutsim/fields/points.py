@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import basix.ufl
 import numpy as np
@@ -17,6 +16,7 @@ from cutsim.base.compat import EntityMaps, create_submesh, form
 from cutsim.base.kinematics import Expr
 from cutsim.base.places import Places, corners, facet_order
 from cutsim.base.signatures import checked
+from cutsim.fields.faces import Face
 from cutsim.fields.state import State
 
 #: Degree of the quadrature on interfaces and tool surfaces.
@@ -213,21 +213,25 @@ class FacetPoints:
 @checked
 @dataclass(frozen=True)
 class Surface:
-    """Surface that a tool can touch: its integration points and, on a crack, its side.
+    """Surface that a tool can touch, a part of the outer boundary or a face of a crack: its integration points.
 
     Args:
-        points: Integration points.
-        side: "+" or "-" on a crack, None on the outer boundary.
+        points: Integration points, over facets that are each seen from one cell.
     """
 
     points: FacetPoints
-    side: Literal["+", "-"] | None = None
 
     @classmethod
     @checked
     def exterior(cls, state: State, facets: NDArray[np.int32]) -> "Surface":
         """A part of the outer boundary, given by its local facets. Collective."""
         return cls(FacetPoints(state.mesh, facets, state.measures.exterior(facets), interior=False))
+
+    @classmethod
+    @checked
+    def of(cls, state: State, face: Face) -> "Surface":
+        """The surface of facets that are seen from one of their cells. Collective."""
+        return cls(FacetPoints(state.mesh, face.facets, state.measures.face(face), interior=False))
 
     @property
     def measure(self) -> ufl.Measure:
@@ -237,9 +241,4 @@ class Surface:
     @property
     def entities(self) -> NDArray[np.int32]:
         """Rows (cell, local facet) of the facets that this rank integrates over."""
-        rows = dict(self.measure.subdomain_data())[self.measure.subdomain_id()].reshape(-1, 4 if self.side else 2)
-        return np.asarray(rows[:, 2:] if self.side == "-" else rows[:, :2])
-
-    def restrict(self, f: Expr) -> Expr:
-        """Restriction of a field of the body to the side."""
-        return f if self.side is None else f(self.side)
+        return np.asarray(dict(self.measure.subdomain_data())[self.measure.subdomain_id()].reshape(-1, 2))

@@ -54,13 +54,14 @@ class ToolHeat(ExchangeTerm):
         )
         self._warm()
         self._exchanges = [
-            HeatExchange(temperature, patch.surface.points, law, body, self._opposite(body), self.name)
+            HeatExchange(temperature, patch.surface.points, law, temperature.value, self._opposite, self.name)
             for patch in tool.touched
-            for body in [patch.surface.restrict(temperature.value)]
         ]
 
-    def _opposite(self, body: Expr) -> Expr:
-        return body if self._tool_temperature is None else self._tool_temperature.constant
+    @property
+    def _opposite(self) -> Expr:
+        """Temperature of what is opposite: the tool, or an adiabatic one's, which has that of the body."""
+        return self.temperature.value if self._tool_temperature is None else self._tool_temperature.constant
 
     def _warm(self) -> None:
         """Let the friction of the tool feel its temperature."""
@@ -76,7 +77,7 @@ class ToolHeat(ExchangeTerm):
     def residual(self, w: Expr) -> ufl.Form:
         """Heat that leaves the body through the surfaces."""
         parts = zip(self.exchanges, self.tool.touched, strict=True)
-        return sum((e.fluxes[0] * p.surface.restrict(w) * p.surface.measure for e, p in parts), start=ufl.Form([]))
+        return sum((e.fluxes[0] * w * p.surface.measure for e, p in parts), start=ufl.Form([]))
 
     def begin(self) -> None:
         """Take over pressure and dissipation of the mechanical step. Collective.

@@ -157,8 +157,8 @@ class Crack(Term):
         return self.law.toughness * self.points.mean(self.points.weights.sum(axis=1)) if self.law is not None else 0.0
 
     def surface(self, side: Literal["+", "-"]) -> Surface:
-        """One face of the crack, for tool contact."""
-        return Surface(self.points, side)
+        """One face of the crack, which a tool can touch. Collective."""
+        return Surface.of(self.state, self.face(side))
 
     def face(self, side: Literal["+", "-"]) -> Face:
         """One face of the crack, for a pair of surfaces. Collective."""

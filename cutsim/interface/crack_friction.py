@@ -1,6 +1,6 @@
 """Friction between the faces of a crack (docs/theory.md §3.3; thesis 4.50–4.55)."""
 
-from typing import Literal, Protocol
+from typing import Protocol
 
 import ufl
 
@@ -9,7 +9,7 @@ from cutsim.base.compat import EntityMaps
 from cutsim.base.kinematics import Expr, displacement_jump
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
-from cutsim.fields.points import FacetPoints, Surface, Values
+from cutsim.fields.points import FacetPoints, Values
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_faces import CrackFaces
@@ -27,9 +27,6 @@ class Faced(Protocol):
     contact: PenaltyContact
     faces: CrackFaces
     closing: bool
-
-    def surface(self, side: Literal["+", "-"]) -> Surface:
-        """One face of it."""
 
 
 class CrackFriction(Term):

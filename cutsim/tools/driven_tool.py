@@ -216,17 +216,13 @@ class DrivenContact(DrivenPart):
         self._first, self._second = (_VirtualMotion(state, turns=axes.turns) for _ in range(2))
         v = ufl.TestFunction(state.V)
 
-        def over_all(density: Callable[[Surface, Expr, Expr], Expr]) -> ufl.Form:
-            return sum((density(*touch) * touch[0].measure for touch in touches), start=ufl.Form([]))
+        def over_all(density: Callable[[Expr, Expr], Expr]) -> ufl.Form:
+            return sum((density(*touch) * surface.measure for surface, *touch in touches), start=ufl.Form([]))
 
-        work = over_all(lambda surface, traction, place: ufl.dot(traction, self._first.displacement(place)))
-        column = over_all(
-            lambda surface, traction, place: self._first.change(ufl.dot(traction, surface.restrict(v)), pose)
-        )
+        work = over_all(lambda traction, place: ufl.dot(traction, self._first.displacement(place)))
+        column = over_all(lambda traction, place: self._first.change(ufl.dot(traction, v), pose))
         corner = over_all(
-            lambda surface, traction, place: self._second.change(
-                ufl.dot(traction, self._first.displacement(place)), pose
-            )
+            lambda traction, place: self._second.change(ufl.dot(traction, self._first.displacement(place)), pose)
         )
         self._work, self._column, self._row, self._corner = (
             form(f, entity_maps=entity_maps) for f in (work, column, ufl.derivative(work, state.u, v), corner)

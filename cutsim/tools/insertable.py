@@ -19,6 +19,7 @@ class Insertable(ABC):
         lateral: Direction across that tells how it is turned about its axis.
         side: 0 for the whole tool, +1 or −1 for the half on the side of ±normal, continued without end to the other
             side.
+        parametric: Its numbers may be form constants, see `cutsim.tools.shapes.with_form_constants`.
         round: Whether its shank is a body of revolution, else it extends along an edge.
         mirrored: Whether it is symmetric about the plane of its axis and of the normal of the crack.
         halving: How its direction `lateral` has to lie to the crack, in words.
@@ -30,6 +31,7 @@ class Insertable(ABC):
     push: Direction
     lateral: Direction | None
     side: int
+    parametric: ClassVar[bool] = True
     round: ClassVar[bool]
     mirrored: ClassVar[bool] = True
     halving: ClassVar[str] = "normal to the crack"

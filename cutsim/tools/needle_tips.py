@@ -37,7 +37,7 @@ class HollowNeedle:
         ValueError: A value is outside its range.
     """
 
-    directions: ClassVar[tuple[str, ...]] = ("push",)
+    parametric: ClassVar[bool] = True
 
     outer_radius: Length
     inner_radius: Length
@@ -86,7 +86,6 @@ class BevelNeedle(Insertable):
         ValueError: A value is outside its range, or push and lateral are not orthogonal vectors in space.
     """
 
-    directions: ClassVar[tuple[str, ...]] = ("push", "lateral")
     round: ClassVar[bool] = True
     mirrored: ClassVar[bool] = False
     halving: ClassVar[str] = "in the plane of the crack"
@@ -145,11 +144,11 @@ class BevelNeedle(Insertable):
 
     def distance(self, x: Expr) -> Expr:
         """Distance to the core, a thinner cylinder with a sharp edge, minus the edge radius [length]."""
-        r, s, c = self.edge_radius, sin(self.bevel_angle), cos(self.bevel_angle)
+        r, s, c = self.edge_radius, ufl.sin(self.bevel_angle), ufl.cos(self.bevel_angle)
         core = self.radius - r
         u, height = along(x, self.lateral), -along(x, self.push) - r
         v = along(x, ufl.cross(ufl.as_vector(self.push), ufl.as_vector(self.lateral)))
-        if self.side:  # both halves mirror each other: beyond the plane all is as in it
+        if self.side != 0:  # both halves mirror each other: beyond the plane all is as in it
             v = positive_part(self.side * v)
         radial = ufl.sqrt(u**2 + v**2 + (1e-8 * r) ** 2)
         side, face = radial - core, (u + core) * c - height * s
@@ -163,7 +162,7 @@ class BevelNeedle(Insertable):
 
     def _to_edge(self, place: tuple[Expr, Expr, Expr], radial: Expr, core: float) -> Expr:
         """Distance to the edge of the core, an ellipse, by Newton's method for the place on it."""
-        (u, v, height), slope = place, 1 / tan(self.bevel_angle)
+        (u, v, height), slope = place, 1 / ufl.tan(self.bevel_angle)
         c, s = u / radial, v / radial
         for _ in range(_ITERATIONS):
             rest = height - core * slope * (c + 1)

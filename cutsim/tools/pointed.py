@@ -18,7 +18,7 @@ from cutsim.tools.insertable import Insertable
 from cutsim.tools.shapes import Direction, along, from_axis, hypot, unit_vector
 
 
-def _pointed(across: Expr, above: Expr, half_angle: float, width: float, scale: float) -> Expr:
+def _pointed(across: Expr, above: Expr, half_angle: Expr, width: Expr, scale: Expr) -> Expr:
     """Distance to a sharp pointed body, a convex polygon, in the plane of its axis.
 
     Args:
@@ -28,12 +28,12 @@ def _pointed(across: Expr, above: Expr, half_angle: float, width: float, scale: 
         width: Half width of the shank.
         scale: A length, to which others are not small.
     """
-    s, c = sin(half_angle), cos(half_angle)
+    s, c = ufl.sin(half_angle), ufl.cos(half_angle)
     slope = across * s + above * c
     tip = ufl.conditional(ufl.lt(across, 0), -above, hypot(across, above, scale))
     flank = across * c - above * s
-    if half_angle > 0:
-        height = width / tan(half_angle)
+    if half_angle != 0:
+        height = width / ufl.tan(half_angle)
         length = (width**2 + height**2) ** 0.5
         joint = hypot(across - width, above - height, scale)
         shank = ufl.conditional(ufl.gt(above, height), across - width, joint)
@@ -50,8 +50,6 @@ class Pointed(Insertable):
         push: Direction in which the tool points; the reference point is the foremost point of the tip.
         lateral: Direction normal to the plane in which the tool is halved.
     """
-
-    directions: ClassVar[tuple[str, ...]] = ("push", "lateral")
 
     half_angle: Angle
     tip_radius: Length
@@ -125,10 +123,9 @@ class Pointed(Insertable):
     def _core(self, x: Expr, above: Expr) -> Expr:
         """Distance to the core, at a height above its tip."""
 
-    def _section(self, across: Expr, above: Expr, side: int) -> Expr:
-        """Distance to the core in the plane of the axis, across on the side of ±lateral."""
-        width = self.width - self.tip_radius
-        return _pointed(across, above, self.flank_angle(side), width, self.tip_radius)
+    def _section(self, across: Expr, above: Expr, angle: Expr) -> Expr:
+        """Distance to the core in the plane of the axis, on a side with this angle between axis and flank."""
+        return _pointed(across, above, angle, self.width - self.tip_radius, self.tip_radius)
 
     def _check(self, width: str) -> None:
         """Refuse values outside their range; directions become unit vectors."""
@@ -203,12 +200,13 @@ class Blade(Pointed):
 
     def _core(self, x: Expr, above: Expr) -> Expr:
         across = along(x, self.lateral)
-        if self.side:
-            section = self._section(self.side * across, above, self.side)
-        elif self.flank_angle(1) == self.flank_angle(-1):
-            section = self._section(abs(across), above, 1)
-        else:  # the larger one of both halves, each without end on the other side
-            section = larger(*(self._section(side * across, above, side) for side in (1, -1)))
+        if self.back_angle is None:
+            section = self._section(abs(across) if self.side == 0 else self.side * across, above, self.half_angle)
+        else:
+            front = self._section(across, above, self.half_angle)
+            back = self._section(-across, above, self.back_angle)
+            # a whole blade is the larger one of both halves, each without end on the other side
+            section = larger(front, back) if self.side == 0 else ufl.conditional(ufl.gt(self.side, 0), front, back)
         if self.edge_length is None:
             return section
         edge = ufl.cross(ufl.as_vector(self.push), ufl.as_vector(self.lateral))
@@ -257,7 +255,7 @@ class Needle(Pointed):
         return self.radius
 
     def _core(self, x: Expr, above: Expr) -> Expr:
-        return self._section(self._across(x), above, 1)
+        return self._section(self._across(x), above, self.half_angle)
 
     def _across(self, x: Expr) -> Expr:
         """Distance from the axis, 0 where a half goes on without end."""

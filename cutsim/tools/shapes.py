@@ -69,20 +69,21 @@ def check_directions(shape: Shape, gdim: int) -> None:
             require(f"shape.{name}", value, len(value) == gdim, f"of {gdim} components, as the mesh has")
 
 
-def with_constant_directions(mesh: Mesh, shape: AnyShape) -> AnyShape:
-    """A shape whose directions are form constants, so that another one needs no other kernel.
+def with_form_constants(mesh: Mesh, shape: AnyShape) -> AnyShape:
+    """A shape whose numbers and directions are form constants, so that another one needs no other kernel.
 
-    The copy is for writing forms only. Which of its fields may be constants a shape says by a class attribute
-    `directions`, names of unit vectors that enter `distance` by vector algebra alone.
+    The copy is for writing forms only. None and zero are kept, since they change the formula.  A shape whose numbers
+    enter `distance` by algebra and UFL's functions alone says so by a class attribute `parametric`; others are left as
+    they are.
 
     Args:
         mesh: Mesh of the forms.
         shape: The shape.
     """
     changed = copy(shape)
-    for name in getattr(type(shape), "directions", ()):
-        if (vector := getattr(shape, name)) is not None:
-            object.__setattr__(changed, name, fem.Constant(mesh, np.array(vector, dtype=default_scalar_type)))
+    for name, value in vars(shape).items() if getattr(type(shape), "parametric", False) else ():
+        if isinstance(value, int | float | tuple) and value != 0:
+            object.__setattr__(changed, name, fem.Constant(mesh, np.array(value, dtype=default_scalar_type)))
     return changed
 
 
@@ -124,7 +125,7 @@ class Ball:
         ValueError: A value is outside its range.
     """
 
-    directions: ClassVar[tuple[str, ...]] = ("axis",)
+    parametric: ClassVar[bool] = True
 
     radius: Length
     axis: Direction | None = None
@@ -159,7 +160,7 @@ class FlatPunch:
         ValueError: A value is outside its range.
     """
 
-    directions: ClassVar[tuple[str, ...]] = ("push",)
+    parametric: ClassVar[bool] = True
 
     radius: Length
     edge_radius: Length
@@ -193,7 +194,7 @@ class Plane:
         ValueError: The normal is zero.
     """
 
-    directions: ClassVar[tuple[str, ...]] = ("normal",)
+    parametric: ClassVar[bool] = True
 
     normal: Direction
 

@@ -27,7 +27,7 @@ from cutsim.tools.carriage import Carriage
 from cutsim.tools.driven_tool import DrivenContact
 from cutsim.tools.passing import Passing
 from cutsim.tools.rigid_tool import RigidTool
-from cutsim.tools.shapes import Shape, ToolPath, check_directions, with_constant_directions
+from cutsim.tools.shapes import Shape, ToolPath, check_directions, with_form_constants
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,9 @@ class Patch:
     ) -> None:
         self.surface, points = surface, surface.points
         position, self._rotation = pose
-        moved = surface.restrict(ufl.SpatialCoordinate(state.mesh) + state.u) - position
+        moved = ufl.SpatialCoordinate(state.mesh) + state.u - position
         self.place = ufl.transpose(self._rotation) * moved
-        x, shape = ufl.variable(self.place), with_constant_directions(state.mesh, shape)
+        x, shape = ufl.variable(self.place), with_form_constants(state.mesh, shape)
         normal = ufl.diff(shape.distance(x), x)
         self._contact = with_constants(state.mesh, laws.contact)
         self._penetration = held = -shape.distance(self.place)
@@ -92,7 +92,7 @@ class Patch:
             held = self._penetration + self._multiplier.shift
         self._pressure = self._contact.pressure(held)
         self.thrust = -self._pressure * normal
-        self._facing = ufl.dot(surface.restrict(_outward(state)), self._rotation * normal)
+        self._facing = ufl.dot(_outward(state), self._rotation * normal)
         self.slip: SlipHistory | None = None
         if laws.friction is not None:
             body = laws.friction.temperature
@@ -101,7 +101,7 @@ class Patch:
                 self._pressure,
                 held,
                 project=lambda slip: tangential(slip, normal),
-                temperature=None if body is None else hotter(surface.restrict(body.value), temperature),
+                temperature=None if body is None else hotter(body.value, temperature),
             )
             self.slip = SlipHistory(state, name, points, laws.friction, rubbing)
         self._known: Remembered[dict[str, Values]] | None = None
@@ -113,7 +113,7 @@ class Patch:
 
     def virtual_work(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ (t − p ∇d)·v: pressure and friction as they act on the tool."""
-        return ufl.dot(self.traction, self.surface.restrict(v)) * self.surface.measure
+        return ufl.dot(self.traction, v) * self.surface.measure
 
     def energy(self) -> ufl.Form:
         """Energy of the contact penalty."""

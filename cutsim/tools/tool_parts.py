@@ -9,7 +9,7 @@ from cutsim.base.signatures import checked
 from cutsim.base.terms import Columns
 from cutsim.fields.points import Values
 from cutsim.tools.insertable import Insertable
-from cutsim.tools.shapes import with_constant_directions
+from cutsim.tools.shapes import with_form_constants
 from cutsim.tools.tool_contact import Patch, ToolContact
 
 #: Parts of a tool, from its foremost point upwards.
@@ -73,7 +73,7 @@ class ToolParts:
 
 def _evaluator(mesh: Mesh, patch: Patch, shape: Insertable) -> Callable[[], dict[str, Values]]:
     """Force densities against the push, and height above the foremost point."""
-    back = -ufl.as_vector(with_constant_directions(mesh, shape).push)
+    back = -ufl.as_vector(with_form_constants(mesh, shape).push)
     friction = ufl.as_ufl(0.0) if patch.slip is None else ufl.dot(patch.slip.traction, back)
     return patch.surface.points.evaluator(
         {"pressure": ufl.dot(patch.thrust, back), "friction": friction, "height": ufl.dot(patch.place, back)}
