@@ -1,4 +1,4 @@
-"""The figure of the page on validation: how far rows are inside their tolerances, and how studies converge."""
+"""The figure of the page on validation: how far rows are inside their tolerances, and how their errors fall."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from cutsim.base.arrays import Array
 from cutsim.validation.page import keyed
-from cutsim.validation.results import Findings, Result
+from cutsim.validation.results import NEGLECTED, Findings, Result
 from cutsim.validation.rows import Group
 
 # parts of a tolerance and errors that are drawn as zero
@@ -18,7 +18,7 @@ _LEAST = 1e-6
 
 
 def draw(path: Path, groups: Sequence[Group], found: Findings) -> None:
-    """Draw the error of each row over what is allowed, and the errors of studies on finer and finer meshes.
+    """Draw the error of each row over what is allowed, and how errors fall on finer and finer meshes.
 
     Args:
         path: The picture.
@@ -30,21 +30,22 @@ def draw(path: Path, groups: Sequence[Group], found: Findings) -> None:
     colours = colormaps["tab20"].colors  # one for each group
     for number, group in enumerate(groups):
         results = [found.results[key] for key, _ in keyed([group]) if key in found.results]
-        ratios = {run.name: run.refinement for run in group.run}
+        ratios = {key: row.refinement for key, row in keyed([group])}
         colour = colours[number % len(colours)]
         _shares(left, number, results, colour)
         for sizes, errors in _studies(results, ratios):
-            right.loglog(sizes, errors, "o-", color=colour, markersize=3, linewidth=0.8)
+            right.loglog(sizes, errors / errors[0], "o-", color=colour, markersize=3, linewidth=0.8, alpha=0.7)
     left.axvline(1.0, color="#c00")
     left.set_xscale("log")
     left.set_yticks(range(len(groups)), [group.title for group in groups])
     left.invert_yaxis()
-    left.set_xlabel("error over what is allowed")
+    left.set_xlabel(f"error over what is allowed; {_LEAST:g} stands for less, too")
     right.set_xlabel("size of elements or steps over that of the coarsest")
-    right.set_ylabel("error")
-    sizes = np.array([0.25, 1.0])
+    right.set_ylabel("error over that of the coarsest")
+    right.set_ylim(2e-3, 3.0)
+    sizes = np.array([0.125, 1.0])
     for order, style in ((1, ":"), (2, "--")):
-        right.loglog(sizes, 0.3 * sizes**order, style, color="black", label=f"order {order}")
+        right.loglog(sizes, sizes**order, style, color="black", linewidth=2, label=f"order {order}")
     right.set_xticks([1.0, 0.5, 0.25, 0.125], ["1", "1/2", "1/4", "1/8"], minor=False)
     right.set_xticks([], minor=True)
     right.legend()
@@ -59,10 +60,10 @@ def _shares(axes: Axes, place: int, results: Sequence[Result], colour: tuple[flo
 
 
 def _studies(results: Sequence[Result], ratios: Mapping[str, float]) -> Iterator[tuple[Array, Array]]:
-    """Sizes and errors of each study, with the ratio of neighbouring sizes of each run."""
+    """Sizes and errors of each study that has any to speak of, with the ratio of neighbouring sizes of each row."""
     for result in results:
         if len(result.values) > 1 and None not in result.values:
             values = np.array(result.values, dtype=float)
             errors: Array = np.abs(values - result.expected) / abs(result.expected or 1.0)
-            if errors.min() > _LEAST:
-                yield ratios[result.key.split("/")[0]] ** -np.arange(len(errors), dtype=float), errors
+            if errors.min() > _LEAST and errors[0] > NEGLECTED * result.tolerance:
+                yield ratios[result.key] ** -np.arange(len(errors), dtype=float), errors

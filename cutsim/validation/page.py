@@ -7,15 +7,16 @@ from functools import partial
 
 from cutsim.validation.peers import Comparisons
 from cutsim.validation.results import Findings, Result
-from cutsim.validation.rows import Group, Row
+from cutsim.validation.rows import Group, Row, Run
 
 #: What stands above this mark in the page is written by hand.
 MARK = "<!-- What follows is written by cutsim validate. -->\n"
 #: Figure of the page, in the folder of the pages.
 FIGURE = "figures/validation.png"
 _CAPTION = (
-    "*Left: error of each row over what it is allowed. Right: errors of rows that were made on finer and finer meshes, "
-    "or with smaller and smaller steps.*"
+    "*Left: error of each row over what it is allowed. Right, in the colours of the left: how the errors of rows fall "
+    "that were made on finer and finer meshes, or with smaller and smaller steps. Lines that stay level are of errors "
+    "that are not of the mesh.*"
 )
 _HEAD = (
     "| what | expected | computed, coarse to fine | error | allowed | source | run |\n"
@@ -41,7 +42,7 @@ def page(head: str, groups: Sequence[Group], found: Findings, peers: Comparisons
     parts = [head.split(MARK)[0] + MARK, _summary(groups, found), f"![Errors of all rows]({FIGURE})", _CAPTION]
     for group in groups:
         parts += [f"## {group.title}", group.text] if group.text else [f"## {group.title}"]
-        parts.append(_HEAD + "".join(_line(row, key, found.results.get(key)) for key, row in keyed([group])))
+        parts.append(_HEAD + "".join(line for run in group.run for line in _lines(run, found)))
     if peers.problems:
         parts += ["## Beside other programs", _PEERS, peers.section()]
     return "\n\n".join(part.strip() for part in parts) + "\n"
@@ -96,17 +97,28 @@ def _total(results: Sequence[Result]) -> float:
     return sum({result.key.split("/")[0]: result.seconds for result in results}.values())
 
 
-def _line(row: Row, key: str, result: Result | None) -> str:
-    what = f"{row.what}. {row.note}" if row.note else row.what
-    if result is None:
-        return f"| {what} | {_number(row.expected, row.unit)} | not run | | | {row.source} | |\n"
-    allowed = _share(result.tolerance, result.expected).lstrip("+")
-    error = "" if result.error is None else _share(result.error, result.expected)
-    verdict = error if result.inside else f'<span style="color:#c00">**{error} outside: {result.reason}**</span>'
+def _lines(run: Run, found: Findings) -> Iterator[str]:
+    """A line for each row of a run, the first of which says what the run is."""
+    for number, row in enumerate(run.row):
+        what = f"{row.what}. {row.note}" if row.note else row.what
+        result = found.results.get(f"{run.name}/{row.name}")
+        if result is None:
+            yield f"| {what} | {_number(row.expected, row.unit)} | not run | | | {row.source} | `{run.name}` |\n"
+            continue
+        allowed = _share(result.tolerance, result.expected).lstrip("+")
+        error = "" if result.error is None else _share(result.error, result.expected)
+        verdict = error if result.inside else f'<span style="color:#c00">**{error} outside: {result.reason}**</span>'
+        made_by = f"`{run.name}`" if number else _made_by(run, result)
+        cells = (what, _number(result.expected, row.unit), _values(row, result), verdict, allowed, row.source, made_by)
+        yield "| " + " | ".join(cells) + " |\n"
+
+
+def _made_by(run: Run, result: Result) -> str:
+    """Name of a run, the program or the command that makes it, and what it takes."""
+    sets = "".join(f" --set {name}={value}" for name, value in run.set.items())
+    name = f"[`{run.name}`](validation/{run.program}.py)" if run.program else f"`{run.name}`: `{run.case}{sets}`"
     size = "" if result.unknowns is None else f", {result.unknowns} unknowns"
-    run = f"`{key.split('/')[0]}`, {result.seconds:.0f} s{size}" + ("" if result.trusted else ", questionable")
-    cells = (what, _number(result.expected, row.unit), _values(row, result), verdict, allowed, row.source, run)
-    return "| " + " | ".join(cells) + " |\n"
+    return f"{name}, {result.seconds:.0f} s{size}" + ("" if result.trusted else ", questionable")
 
 
 def _values(row: Row, result: Result) -> str:

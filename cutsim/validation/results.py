@@ -17,6 +17,8 @@ from cutsim.validation.rows import Row, Run
 
 # part of a reference that is no error
 _ROUNDING = 1e-8
+#: Part of a tolerance below which errors are of what else is neglected, and say nothing of the mesh.
+NEGLECTED = 0.1
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def judge(run: Run, row: Row, levels: Sequence[Level], made: str, *, quick: bool
         reason = share if abs(error) > tolerance else ""
     return Result(
         key=f"{run.name}/{row.name}", values=tuple(values), expected=expected, error=error, tolerance=tolerance,
-        order=observed_order(values, expected, run.refinement), reason=reason,
+        order=observed_order(values, expected, row.refinement, NEGLECTED * tolerance), reason=reason,
         trusted=levels[-1].status == 0, seconds=round(sum(level.seconds for level in levels), 2),
         unknowns=levels[-1].unknowns, made=made,
     )  # fmt: skip
@@ -118,7 +120,7 @@ def _values(value: str | list[str], levels: Sequence[Level]) -> tuple[list[float
     return values, reason
 
 
-def observed_order(values: Sequence[float | None], expected: float, ratio: float) -> float | None:
+def observed_order(values: Sequence[float | None], expected: float, ratio: float, least: float) -> float | None:
     """Observed order in the size of mesh or step.
 
     Of three levels or more it is that of the differences of the last three, which do not know the reference; of two,
@@ -128,16 +130,17 @@ def observed_order(values: Sequence[float | None], expected: float, ratio: float
         values: The values, from coarse to fine; None where one is missing.
         expected: The reference.
         ratio: Ratio of the sizes of neighbours.
+        least: Error, relative where the reference is not zero, below which two of them show no order.
 
     Returns:
-        The order; None where differences or errors do not fall, or are of rounding.
+        The order; None where differences or errors do not fall, change their sign, or are too small.
     """
     known = [value for value in values[-3:] if value is not None]
     if len(known) < max(2, min(len(values), 3)):
         return None
-    falling = np.diff(known) if len(known) == 3 else np.abs(np.array(known) - expected)
+    falling, floor = (np.diff(known), _ROUNDING) if len(known) == 3 else (np.array(known) - expected, least)
     before, last = (float(part) for part in falling / abs(expected or 1.0))
-    converges = before * last > 0 and abs(before) > abs(last) > _ROUNDING
+    converges = before * last > 0 and abs(before) > abs(last) > max(floor, _ROUNDING)
     return log(before / last) / log(ratio) if converges else None
 
 

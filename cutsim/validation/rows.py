@@ -39,6 +39,7 @@ class Row(_Table):
             the coarsest mesh or step to the finest, which counts.
         expected: The reference.
         tolerance: Allowed relative error [–], or absolute one where zero is expected.
+        refinement: Ratio of the sizes of neighbours in a study.
         unit: Unit of both; empty for a pure number.
         source: Where the reference comes from, with equation, table or doi.
         note: What a reader should know of it, such as the cause of a deviation.
@@ -50,6 +51,7 @@ class Row(_Table):
     value: _Text | Annotated[list[_Text], Field(min_length=2)]
     expected: float
     tolerance: Annotated[float, Field(gt=0)]
+    refinement: Annotated[float, Field(gt=1)] = 2.0
     unit: str = ""
     source: _Text
     note: str = ""
@@ -67,7 +69,6 @@ class Run(_Table):
         arguments: Arguments of the program.
         study: Further changes of the case or options of the program, one table for each mesh or step, from the coarsest
             to the finest, which counts; a quick program has its own mesh and leaves them out.
-        refinement: Ratio of the sizes of neighbours in the study.
         row: The rows.
     """
 
@@ -77,7 +78,6 @@ class Run(_Table):
     set: dict[str, Any] = {}
     arguments: list[str] = []
     study: list[dict[str, Any]] = []
-    refinement: Annotated[float, Field(gt=1)] = 2.0
     row: Annotated[list[Row], Field(min_length=1)]
 
     @model_validator(mode="after")

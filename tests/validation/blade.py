@@ -123,6 +123,7 @@ def main(
     ] = None,
     heat: Annotated[bool, typer.Option("--heat", help="temperature of the cut faces, with friction")] = False,
     depth: Annotated[float | None, typer.Option(help="depth of the cut in mm")] = None,
+    coarser: Annotated[float, typer.Option(min=1, help="factor on the size of the elements along the crack")] = 1.0,
     quick: Annotated[bool, typer.Option("--quick", help="coarse and short")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/blade"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
@@ -133,6 +134,7 @@ def main(
     claim_folder(out, MPI.COMM_WORLD, overwrite=overwrite)
     given = SETTINGS[dim, quick]
     setting = replace(given, toughness=toughness or given.toughness, depth=depth or given.depth)
+    setting = replace(setting, mesh=setting.mesh | {"lc": coarser * setting.mesh["lc"]})
     domain = read_geo(MESH, MPI.COMM_WORLD, setting.mesh, gdim=dim)
     values = friction or [0.0]
     curves: list[Curve] = []
@@ -140,7 +142,7 @@ def main(
         for mu in values:
             folder = out if len(values) == 1 else out / f"mu_{mu:g}"
             summary = push(domain, setting, SILICONES[material], mu, folder, heat, curves)
-            check(summary, mu, steady=dim == 2 and not quick and not mu)
+            check(summary, mu, steady=dim == 2 and not quick and not mu and coarser == 1)
     finally:  # also what an interrupted sweep has come to
         if len(values) > 1 and MPI.COMM_WORLD.rank == 0:
             plot_curves(

@@ -448,10 +448,13 @@ STEEL = Pair(
 COLUMN = replace(STEEL, slab=SIDE, uniform=True, elements=1, layer=0.1, growth=1.1, steps=20)
 
 
-def pairs(*, quick: bool) -> dict[str, Pair]:
+def pairs(coarser: int, *, quick: bool) -> dict[str, Pair]:
     """What is rubbed, by name."""
     if not quick:
-        return {"thesis": THESIS, "steel": STEEL, "column": COLUMN}
+        return {
+            name: replace(pair, steps=pair.steps // coarser, layer=pair.layer * coarser)
+            for name, pair in {"thesis": THESIS, "steel": STEEL, "column": COLUMN}.items()
+        }
     return {
         "thesis": replace(THESIS, elements=3, layer=2.0),
         "steel": replace(STEEL, elements=3, layer=2.0, strokes=3, steps=4),
@@ -480,6 +483,7 @@ def check(results: dict[str, dict[str, float]]) -> None:
 
 
 def main(
+    coarser: Annotated[int, typer.Option(min=1, help="factor on the height of elements and on the steps")] = 1,
     quick: Annotated[bool, typer.Option("--quick", help="coarser, with fewer strokes")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/frictional_heating"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
@@ -489,7 +493,7 @@ def main(
     logging.basicConfig(level=level, format="%(name)s: %(message)s")
     claim_folder(out, COMM, overwrite=overwrite)
     results = {}
-    for name, pair in pairs(quick=quick).items():
+    for name, pair in pairs(coarser, quick=quick).items():
         rubbing, history = rub(pair, name, out / name)
         results[name] = balance(rubbing, history)
         draw(rubbing, history, out / name, f"Frictional heating: {name}")

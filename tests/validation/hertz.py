@@ -485,7 +485,7 @@ def check(results: dict[str, dict[str, float]], *, quick: bool) -> None:
     # the audit's trapezoidal rule for the work of a force that grows with the power 3/2
     force = np.linspace(0.0, 1.0, 1 + (QUICK if quick else FULL).steps) ** 1.5
     trapezoidal = np.mean(0.5 * (force[1:] + force[:-1])) / 0.4 - 1
-    for name in ("rigid", "thesis", "elastic"):
+    for name in ("rigid", "elastic", *(() if quick else ("thesis",))):
         result = results[name]
         assert result["force_off"] < (0.03 if quick else 0.02), name
         assert abs(result["radius_over_hertz_last"] - 1) < (0.05 if name == "elastic" else 0.02), name
@@ -516,8 +516,9 @@ def main(
         results |= {f"{name}_{cells}": row for cells, row in rows.items()} | {name: rows[meshes[name][-1]]}
         if COMM.rank == 0:
             compare(specimen, histories, out / name, elastic=name == "elastic")
-    thesis = Indentation.rigid(replace(specimen, material=THESIS), meshes["rigid"][1])
-    results["thesis"] = thesis.result(indent(thesis))
+    for name, cells in ({} if quick else {"thesis_2": 2, "thesis": 3}).items():
+        thesis = Indentation.rigid(replace(specimen, material=THESIS), cells)
+        results[name] = thesis.result(indent(thesis))
     lines = {"mindlin": MINDLIN, "cylinder": CYLINDER}
     if not quick:
         fine = {f"cylinder_{n}": replace(CYLINDER, size=0.5 / n) for n in (1, 2, 4)}

@@ -132,10 +132,11 @@ BLOCKS = (
     SHARP,
     RUBBED,
 )
+QUICK = 0.9  # depth of the tip at the end, a fifth of a millimetre after the puncture [mm]
 
 
 def main(
-    quick: Annotated[bool, typer.Option("--quick", help="silicone only")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="silicone only, until it has punctured")] = False,
     out: Annotated[Path, typer.Option(help="where the results go")] = Path("results/validation/puncture"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="replace the results of an older run")] = False,
     only: Annotated[str, typer.Option(help="name of a block, to puncture it alone")] = "",
@@ -146,9 +147,13 @@ def main(
     begun, summary, curves = time.perf_counter(), {}, []
     blocks = [SILICONE] if quick else [block for block in BLOCKS if only in ("", block.name)]
     for block in blocks:
-        intact, notched = (push(block, notch, out) for notch in (0.0, block.notch))
-        summary |= {f"{block.name}: {name}": value for name, value in found(block, intact, notched).items()}
-        for history, label in ((intact, "intact"), (notched, "notched")):
+        histories = {"intact": push(block, 0.0, QUICK if quick else block.depth, out)}
+        values = punctured(block, histories["intact"])
+        if not quick:
+            histories["notched"] = push(block, block.notch, block.depth, out)
+            values |= compared(block, *histories.values())
+        summary |= {f"{block.name}: {name}": value for name, value in values.items()}
+        for label, history in histories.items():
             curves.append(Curve(history["depth"], history["force"] / block.bond.toughness, f"{block.name}, {label}"))
     summary |= {"ranks": float(COMM.size), "wall_time": time.perf_counter() - begun}
     write_summary(out / "summary.json", summary, COMM)
@@ -165,8 +170,8 @@ def main(
     check(summary, blocks)
 
 
-def push(block: Block, notch: float, out: Path) -> History:
-    """A push to the end. Collective."""
+def push(block: Block, notch: float, depth: float, out: Path) -> History:
+    """A push to a depth. Collective."""
     drive = Drive(1.0)
     cut = Insertion.build(block.body(notch), block.blade, drive, notch=notch, friction=block.friction or None)
     folder = out / f"{block.name.replace(', ', '-').replace(' ', '-')}-{'notched' if notch else 'intact'}"
@@ -177,7 +182,7 @@ def push(block: Block, notch: float, out: Path) -> History:
         deepest = max(contact.penetration() * contact.patches[0].normal_size for contact in cut.contacts)
         return cut.columns(columns) | {"penetration": (deepest, "length")}
 
-    end = cut.time_of(block.depth)
+    end = cut.time_of(depth)
     with Recording(folder, cut.mechanics, end, title=block.name, extra=columns, every=0) as recording:
         run(cut.mechanics, end, control, recording)
     return recording.columns()
@@ -186,20 +191,34 @@ def push(block: Block, notch: float, out: Path) -> History:
 # ## Results
 
 
-def found(block: Block, intact: History, notched: History) -> dict[str, float]:
-    """What the two runs say."""
+def at_puncture(block: Block, intact: History) -> int:
+    """Step at which the block gives way; on the shank the force may grow beyond that of the puncture."""
+    return int(np.argmax(np.where(intact["front"] < 2 * block.blade.tip_radius, intact["force"], 0.0)))
+
+
+def punctured(block: Block, intact: History) -> dict[str, float]:
+    """What the run into the intact block says."""
+    peak = at_puncture(block, intact)
+    return {
+        "depth of the puncture [mm]": float(intact["depth"][peak]),
+        "force of the puncture over the toughness": float(intact["force"][peak] / block.bond.toughness),
+        "least force after it over the peak": float((intact["force"][peak:] / intact["force"][peak]).min()),
+        "penetration over the size along the crack": float(intact["penetration"].max() / block.rule.size),
+        "largest closure": float(np.abs(intact["energy_closure"]).max()),
+        "steps": float(len(intact["depth"])),
+    }
+
+
+def compared(block: Block, intact: History, notched: History) -> dict[str, float]:
+    """What it says beside the run from a notch."""
     start, end = block.settled, block.depth
-    # on the shank the force may grow beyond that of the puncture
-    peak = int(np.argmax(np.where(intact["front"] < 2 * block.blade.tip_radius, intact["force"], 0.0)))
+    peak = at_puncture(block, intact)
     steady = [SteadyCut.of(history, start, end) for history in (intact, notched)]
     works = [work_until(intact["depth"][peak], history) for history in (intact, notched)]
     lost = intact["energy_fracture"] + intact["energy_friction"] + intact["energy_viscous"]
     viscous = np.diff(np.interp([start, end], intact["depth"], intact["energy_viscous"]))[0] / block.steady
     expected = steady_force(block.bond.toughness + viscous, 1.0, block.stiffness)
     return {
-        "depth of the puncture [mm]": float(intact["depth"][peak]),
-        "force of the puncture over the toughness": float(intact["force"][peak] / block.bond.toughness),
-        "least force after it over the peak": float((intact["force"][peak:] / intact["force"][peak]).min()),
         "steady force over that from a notch": steady[0].force / steady[1].force,
         "drift of the steady force": steady[0].drift,
         "drift of that from a notch": steady[1].drift,
@@ -207,9 +226,6 @@ def found(block: Block, intact: History, notched: History) -> dict[str, float]:
         "steady force over closed form": float(steady[0].force / expected),
         "work until the puncture over that from a notch": works[0] / works[1],
         "part of what is lost that the viscosity takes": float(intact["energy_viscous"][-1] / lost[-1]),
-        "penetration over the size along the crack": float(intact["penetration"].max() / block.rule.size),
-        "largest closure": float(np.abs(intact["energy_closure"]).max()),
-        "steps": float(len(intact["depth"])),
     }
 
 
@@ -224,10 +240,13 @@ def check(summary: dict[str, float], blocks: list[Block]) -> None:
     for block in blocks:
         start = f"{block.name}: "
         values = {name.removeprefix(start): v for name, v in summary.items() if name.startswith(start)}
-        assert abs(values["steady force over that from a notch"] - 1) < 0.01, block.name
         assert values["largest closure"] < 0.01, block.name
         assert values["penetration over the size along the crack"] < 0.1, block.name
-        assert values["work until the puncture over that from a notch"] > 1, block.name
+        if "steady force over that from a notch" in values:
+            assert abs(values["steady force over that from a notch"] - 1) < 0.01, block.name
+            assert values["work until the puncture over that from a notch"] > 1, block.name
+        else:
+            assert values["least force after it over the peak"] < 0.7, block.name
 
 
 if __name__ == "__main__":

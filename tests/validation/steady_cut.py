@@ -102,7 +102,7 @@ class Strip:
 # ## Settings
 
 FULL = (Strip(2, 0.1), Strip(2, 0.05), Strip(3, 0.2), Strip(3, 0.1))
-QUICK = (Strip(2, 0.2), Strip(2, 0.1), Strip(3, 0.2, layers=1))
+QUICK = (Strip(2, 0.1), Strip(3, 0.2, layers=1))
 
 Summary = dict[str, float | list[float]]
 History = dict[str, np.ndarray]
