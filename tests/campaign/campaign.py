@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from draws import LARGEST, Draw
-from summary import keep, read, summary
+from summary import code, keep, read, summary
 
 from cutsim.results.folder import HISTORY
 from cutsim.results.run_files import RunFiles
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 print(_line(rows[name]), flush=True)
     print(*summary(list(rows.values())), sep="\n")
     if options.keep:
-        keep(options.seed, results)
+        keep(options.seed, list(rows.values()))
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -67,13 +67,13 @@ def _run(name: str, draw: Draw, folder: Path, seconds: int) -> dict[str, Any]:
     before = _spent()
     with (folder / f"{name}.log").open("w", encoding="utf-8") as log:
         status = subprocess.run(
-            [sys.executable, "-m", "cutsim", "run", str(case), "-o", str(out), "--overwrite"],
+            [sys.executable, "-m", "cutsim", "run", str(case), "-o", str(out), "--overwrite", "-v"],
             stdout=log,
             stderr=log,
             check=False,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 30)),
         ).returncode
-    row = {"run": name, "class": draw.kind, "status": status, "seconds": round(_spent() - before, 1)}
+    row = {"run": name, "class": draw.kind, "code": code(), "status": status, "seconds": round(_spent() - before, 1)}
     return row | draw.parameters() | (_found(RunFiles.read(out)) if (out / HISTORY).exists() else {})
 
 

@@ -1,12 +1,16 @@
 """What a campaign of random cuts has shown, in words and as the table of docs/when_a_run_does_not_converge.md."""
 
+import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
-from shutil import copyfile
+from signal import Signals
 from statistics import median
 from typing import Any
 
+import cutsim
 from cutsim.commands.endings import Ending
 from cutsim.interface.doubts import DEEP
 
@@ -34,8 +38,17 @@ _TITLES = (
     "closure",
     "penetration / h",
 )
+_FAULTS = ("cut", "class", "what is not good", "time [s]", "crack grown by [mm]", "steps (rejected)", "processor [s]")
 
 Row = dict[str, Any]
+
+
+@cache
+def code() -> str:
+    """A short number that tells states of the code apart: results of two of them are not those of one."""
+    package = Path(cutsim.__file__).parent
+    files = sorted(path.relative_to(package).as_posix() for path in package.rglob("*.py"))
+    return hashlib.sha256(b"".join(name.encode() + (package / name).read_bytes() for name in files)).hexdigest()[:10]
 
 
 def read(path: Path) -> list[Row]:
@@ -65,6 +78,13 @@ def rightly_indents(row: Row) -> bool:
     return row["cut"] < CUT and effort(row) >= 1
 
 
+def causes(row: Row) -> list[str]:
+    """How a cut has ended before its end, or what its verdict doubts, in a few words each; none if it is trusted."""
+    if row["status"] < 0:
+        return [f"ended by {Signals(-row['status']).name}" if row["status"] != -Signals.SIGXCPU else "out of time"]
+    return row["doubts"] if ended(row) else [Ending(row["status"]).words]
+
+
 def medians(rows: Sequence[Row]) -> dict[str, float]:
     """Processor time of the cuts that have come to their end, by class [s]."""
     done = [row for row in rows if ended(row)]
@@ -78,6 +98,8 @@ def summary(rows: Sequence[Row]) -> Iterator[str]:
         some = [row for row in rows if row["dim"] == dim]
         done = [row for row in some if ended(row)]
         yield f"{dim}-D: {len(done)} of {len(some)} come to their end, not {_names([r for r in some if not ended(r)])}"
+        for words in sorted({words for row in some for words in causes(row)}):
+            yield f"  {words}: {_names([row for row in some if words in causes(row)])}"
         findings = {
             f"in more than {SLOW:g} times the median of their class": [
                 row for row in done if row["seconds"] > SLOW * usual[row["class"]]
@@ -120,21 +142,44 @@ def _cells(kind: str, rows: Sequence[Row], usual: dict[str, float]) -> tuple[str
     )
 
 
+def not_good(rows: Sequence[Row]) -> list[str]:
+    """The other table of the page: a line for each cut that does not end, is doubted, or takes long."""
+    usual, lines = medians(rows), [_FAULTS, ("---",) * len(_FAULTS)]
+    for row in rows:
+        slow = ended(row) and row["seconds"] > SLOW * usual[row["class"]]
+        if found := causes(row) + [f"{row['seconds'] / usual[row['class']]:.1f} times the median"] * slow:
+            how = ("–",) * 3
+            if "depth" in row:
+                how = (f"{row['time']:.2f}", f"{row['cut']:.2f}", f"{row['steps']} ({row['rejected']})")
+            lines.append((row["run"], row["class"], ", ".join(found), *how, f"{row['seconds']:.0f}"))
+    return [f"| {' | '.join(line)} |" for line in lines]
+
+
+def states(rows: Sequence[Row]) -> str:
+    """How many cuts were run with which state of the code, in a sentence."""
+    counts = Counter(row.get("code") for row in rows)
+    words = [f"{n} with {f'state {state} of the code' if state else 'older states'}" for state, n in counts.items()]
+    return f"Of these cuts {', '.join(words)} were run."
+
+
 def kept() -> list[Row]:
-    """The results that are kept."""
-    return [row for path in sorted(KEPT.glob("seed-*.jsonl")) for row in read(path)]
+    """The results that are kept, each with its seed before its number."""
+    files = {path.stem.removeprefix("seed-"): read(path) for path in sorted(KEPT.glob("seed-*.jsonl"))}
+    return [row | {"run": f"{seed}/{row['run']}"} for seed, rows in files.items() for row in rows]
 
 
 def page() -> str:
-    """The page with the table of the results that are kept."""
+    """The page with the tables of the results that are kept."""
     before, rest = PAGE.read_text(encoding="utf-8").split(_BEGIN)
-    return before + _BEGIN + "\n".join(["", *table(kept()), "", ""]) + _END + rest.split(_END)[1]
+    tables = ["", *table(kept()), "", *not_good(kept()), "", states(kept()), "", ""]
+    return before + _BEGIN + "\n".join(tables) + _END + rest.split(_END)[1]
 
 
-def keep(seed: int, results: Path) -> None:
-    """Keep the results of a seed, and make the table of the page of all that are kept."""
+def keep(seed: int, rows: Sequence[Row]) -> None:
+    """Keep the results of a seed, and make the tables of the page of all that are kept."""
     KEPT.mkdir(exist_ok=True)
-    copyfile(results, KEPT / f"seed-{seed}.jsonl")
+    lines = [json.dumps(row) + "\n" for row in rows]
+    (KEPT / f"seed-{seed}.jsonl").write_text("".join(lines), encoding="utf-8")
     PAGE.write_text(page(), encoding="utf-8")
 
 
