@@ -114,9 +114,9 @@ def _lines(run: Run, found: Findings) -> Iterator[str]:
 
 
 def _made_by(run: Run, result: Result) -> str:
-    """Name of a run, the program or the command that makes it, and what it takes."""
-    sets = "".join(f" --set {name}={value}" for name, value in run.set.items())
-    name = f"[`{run.name}`](validation/{run.program}.py)" if run.program else f"`{run.name}`: `{run.case}{sets}`"
+    """Name of a run, the program or the case that makes it, and what it takes."""
+    case = run.case + "".join(f" --set {name}={value}" for name, value in run.levels[-1].items())
+    name = f"[`{run.name}`](validation/{run.program}.py)" if run.program else f"`{run.name}`: `cutsim run {case}`"
     size = "" if result.unknowns is None else f", {result.unknowns} unknowns"
     return f"{name}, {result.seconds:.0f} s{size}" + ("" if result.trusted else ", questionable")
 
