@@ -186,7 +186,7 @@ def test_a_group_that_the_mesh_lacks_is_named():
 def test_the_page_on_case_files_names_all():
     page = (Path(__file__).parents[1] / "docs" / "case_files.md").read_text(encoding="utf-8")
     section = page.partition("## Cases that come with cutsim")[2].partition("\n## ")[0]
-    assert set(re.findall(r"`([a-z-]+)`", section)) - {"extends"} == set(CASES)
+    assert set(re.findall(r"`([a-z0-9-]+)`", section)) - {"extends"} == set(CASES)
 
 
 def test_a_front_is_found_also_where_it_goes_down():

@@ -159,7 +159,8 @@ def test_uniform_pressure(pair, slipped):
     assert result["heat_kept"] == pytest.approx(work, rel=1e-6)
     assert result["mean_rise"] == pytest.approx(work / capacity, rel=1e-6)
     assert result["heat_closure"] < 1e-10 and result["energy_closure"] < 1e-9
-    assert np.ptp(rubbing.crack.point_values("pressure")) < 1e-7 * pair.pressure
+    # out-of-balance forces that count as rounding are 1e-4 N, of 400 N on a facet
+    assert np.ptp(rubbing.crack.point_values("pressure")) < 1e-6 * pair.pressure
 
 
 def test_series_are_approached():

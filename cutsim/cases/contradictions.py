@@ -50,8 +50,9 @@ def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
     """Positions and directions of a case."""
     for name, tool in valid.get("tools", {}).items():
         yield from _moving(("tools", name), tool)
-        for part in getattr(type(tool.made), "directions", ()):
-            yield ("tools", name, part), getattr(tool, part)
+        parameters = {} if tool.made is None else vars(tool.made)
+        directions = (part for part, value in parameters.items() if isinstance(value, tuple))
+        yield from ((("tools", name, part), getattr(tool, part)) for part in directions)
     for name, carriage in valid.get("carriages", {}).items():
         yield from _moving(("carriages", name), carriage)
     insertion = valid.get("insertion")
