@@ -7,6 +7,7 @@ from cutsim.cases.geometries import LAMINATE
 from cutsim.cases.keys import Keys
 from cutsim.cases.schema_parts import Carriage, Moved, Pair, Tool, Weight
 from cutsim.cases.schema_rigs import AnyMachine
+from cutsim.tools.shapes import directions
 
 _ABSOLUTE_ZERO = {"K": 0.0, "degC": -273.15}
 # vectors of the motions of tools
@@ -50,9 +51,8 @@ def _vectors(valid: Mapping[str, Any]) -> Iterator[tuple[Keys, Any]]:
     """Positions and directions of a case."""
     for name, tool in valid.get("tools", {}).items():
         yield from _moving(("tools", name), tool)
-        parameters = {} if tool.made is None else vars(tool.made)
-        directions = (part for part, value in parameters.items() if isinstance(value, tuple))
-        yield from ((("tools", name, part), getattr(tool, part)) for part in directions)
+        if tool.made is not None:
+            yield from ((("tools", name, part), getattr(tool, part)) for part in directions(tool.made))
     for name, carriage in valid.get("carriages", {}).items():
         yield from _moving(("carriages", name), carriage)
     insertion = valid.get("insertion")

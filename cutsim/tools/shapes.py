@@ -58,15 +58,19 @@ def unit_vector(name: str, vector: Direction) -> Direction:
     return tuple(float(v) / norm for v in vector)
 
 
+def directions(shape: object) -> dict[str, Direction]:
+    """The parameters of a shape that have as many components as the mesh has dimensions, by name."""
+    return {name: value for name, value in vars(shape).items() if isinstance(value, tuple)}
+
+
 def check_directions(shape: Shape, gdim: int) -> None:
     """Refuse a shape with directions of another dimension than the mesh.
 
     Raises:
         ValueError: A direction has not as many components as the mesh.
     """
-    for name, value in vars(shape).items():
-        if isinstance(value, tuple):
-            require(f"shape.{name}", value, len(value) == gdim, f"of {gdim} components, as the mesh has")
+    for name, value in directions(shape).items():
+        require(f"shape.{name}", value, len(value) == gdim, f"of {gdim} components, as the mesh has")
 
 
 def with_form_constants(mesh: Mesh, shape: AnyShape) -> AnyShape:
@@ -80,8 +84,10 @@ def with_form_constants(mesh: Mesh, shape: AnyShape) -> AnyShape:
         mesh: Mesh of the forms.
         shape: The shape.
     """
+    if not getattr(type(shape), "parametric", False):
+        return shape
     changed = copy(shape)
-    for name, value in vars(shape).items() if getattr(type(shape), "parametric", False) else ():
+    for name, value in vars(shape).items():
         if isinstance(value, int | float | tuple) and value != 0:
             object.__setattr__(changed, name, fem.Constant(mesh, np.array(value, dtype=default_scalar_type)))
     return changed
