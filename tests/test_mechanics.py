@@ -64,6 +64,15 @@ def test_a_problem_that_is_dropped_is_freed():
     assert [reference() for reference in kept] == 4 * [None]
 
 
+@pytest.mark.mpi
+def test_all_problems_share_one_communicator_of_petsc():
+    """On several ranks PETSc frees what Python drops by communicator: what lies on that of a mesh stays with it."""
+    solvers = [pried_and_pressed().problem.snes for _ in range(2)]
+    things = [thing for snes in solvers for thing in (snes, snes.getFunction()[0], *snes.getJacobian()[:2])]
+    kinds = {MPI.Comm.Compare(things[0].comm.tompi4py(), thing.comm.tompi4py()) for thing in things}
+    assert kinds == {MPI.IDENT}
+
+
 DIRECT = {"ksp_type": "preonly", "pc_type": "lu"}
 
 

@@ -1,13 +1,18 @@
 """Assembly of compiled forms to reduced numbers and owned arrays. Every function is collective."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from dolfinx import fem, la
 from dolfinx.common import IndexMap
+from dolfinx.cpp.la.petsc import create_matrix
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.arrays import Array
+from cutsim.base.compat import sparsity_pattern
+from cutsim.base.lifetime import petsc_comm
 
 
 def integrate(form: fem.Form) -> float:
@@ -24,10 +29,17 @@ def nodal_forces(form: fem.Form) -> Array:
 
 def owned_vector(index_map: IndexMap, bs: int) -> PETSc.Vec:
     """PETSc vector of the owned dofs of a map, all zero; the caller destroys it."""
-    vector = PETSc.Vec().create(index_map.comm)
+    vector = PETSc.Vec().create(petsc_comm(index_map.comm))
     vector.setSizes((index_map.size_local * bs, index_map.size_global * bs), bsize=bs)
     vector.setUp()
     return vector
+
+
+def empty_matrix(forms: Sequence[fem.Form]) -> PETSc.Mat:
+    """PETSc matrix with the pattern of the sum of bilinear forms on the same spaces, all zero. Collective."""
+    pattern = sparsity_pattern(forms)
+    pattern.finalize()
+    return create_matrix(petsc_comm(forms[0].mesh.comm), pattern)
 
 
 def global_dot(comm: MPI.Comm, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

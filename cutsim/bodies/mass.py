@@ -68,7 +68,7 @@ class Mass:
         mass = self._matrix(bcs, directions)
         x, b = mass.A.createVecs()
         b.array[:] = forces
-        ksp = PETSc.KSP().create(self._state.mesh.comm)
+        ksp = PETSc.KSP().create(mass.A.comm)
         ksp.setOperators(mass.A)
         ksp.setType("cg")
         ksp.getPC().setType("jacobi")  # conditions a mass matrix independently of the mesh

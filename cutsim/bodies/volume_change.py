@@ -18,7 +18,7 @@ from dolfinx.fem import petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from cutsim.base.assembly import Array, add_blocks
+from cutsim.base.assembly import Array, add_blocks, empty_matrix
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.fields.state import State
@@ -133,7 +133,7 @@ class _Blocks:
 
     def __init__(self, a: ufl.Form, rows: int, cells: NDArray[np.int32]) -> None:
         self._a = form(a)
-        self._matrix = petsc.create_matrix(self._a)
+        self._matrix = empty_matrix([self._a])
         ends, columns, _ = self._values()
         starts = ends[rows * cells[:, None] + np.arange(rows)].astype(np.int64)
         dofmap = a.arguments()[1].ufl_function_space().dofmap

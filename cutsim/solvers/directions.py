@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base.assembly import Array
+from cutsim.base.lifetime import petsc_comm
 from cutsim.fields.space import refuse
 
 # cosine between directions that counts as none, and its difference from one
@@ -143,7 +144,7 @@ class Directions:
         columns = np.broadcast_to(unknowns, blocks.shape)
         size = index_map.size_local * self._gdim, index_map.size_global * self._gdim
         csr = starts, columns.ravel(), blocks.ravel()
-        return PETSc.Mat().createAIJ((size, size), bsize=self._gdim, csr=csr, comm=self._V.mesh.comm)
+        return PETSc.Mat().createAIJ((size, size), bsize=self._gdim, csr=csr, comm=petsc_comm(self._V.mesh.comm))
 
 
 def _axes(parts: Sequence[Guided], gdim: int) -> tuple[Array, NDArray[np.int64]]:

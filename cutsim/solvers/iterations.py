@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from petsc4py import PETSc
 
 from cutsim.base import compat
+from cutsim.base.lifetime import petsc_comm, weakly
 from cutsim.base.options import Options
 from cutsim.solvers.convergence import BC_ROUNDING, Criteria, Iteration, Judge, Reason
-from cutsim.solvers.lifetime import weakly
 from cutsim.solvers.linear import LinearSolver
 from cutsim.solvers.norms import Norms
 from cutsim.solvers.system import System
@@ -84,9 +84,9 @@ class Iterations:
         self._system, self._options = system, options
         self.measures = Norms(system)
         # the vector is not that of u, which line searches would spoil as their own start
-        self._x = PETSc.Vec().createWithArray(system.unknowns, comm=system.comm)
+        self._x = PETSc.Vec().createWithArray(system.unknowns, comm=petsc_comm(system.comm))
         self._f = self._x.duplicate()
-        self.snes = PETSc.SNES().create(system.comm)
+        self.snes = PETSc.SNES().create(self._x.comm)
         self.snes.setOptionsPrefix(options.prefix)
         self.snes.setFunction(weakly(self._evaluate_residual), self._f)
         self._set_matrix()

@@ -16,7 +16,7 @@ from dolfinx import fem, la
 from dolfinx.fem import petsc
 from petsc4py import PETSc
 
-from cutsim.base.assembly import Array
+from cutsim.base.assembly import Array, empty_matrix
 from cutsim.base.compat import form
 from cutsim.base.terms import Multiplier
 from cutsim.solvers.directions import Directions
@@ -120,7 +120,7 @@ class _Row:
         self._g = form(multiplier.equation)
         self._by_u = form(ufl.derivative(multiplier.equation, u, ufl.TrialFunction(V)))
         self._by_value = form(ufl.derivative(multiplier.equation, self.value, ufl.TrialFunction(Q)))
-        self.B, self.C = petsc.create_matrix(self._by_u), petsc.create_matrix(self._by_value)
+        self.B, self.C = empty_matrix([self._by_u]), empty_matrix([self._by_value])
         self._components: PETSc.Mat | None = None
         if directions:
             self._turn()

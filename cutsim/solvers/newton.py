@@ -13,11 +13,11 @@ from petsc4py import PETSc
 
 from cutsim.base import compat
 from cutsim.base.checks import require
+from cutsim.base.lifetime import free_dropped
 from cutsim.base.options import Options
 from cutsim.solvers.convergence import CRITERIA, Criteria
 from cutsim.solvers.directions import Directions
 from cutsim.solvers.iterations import LINE_SEARCHES, Iterations, Outcome
-from cutsim.solvers.lifetime import free_dropped
 from cutsim.solvers.path import PathIterations, PathStep
 from cutsim.solvers.preconditioners import LaggedPC
 from cutsim.solvers.system import STRUCTURE, Structure, System

@@ -187,7 +187,7 @@ def rigid_body_modes(V: fem.FunctionSpace, turn: Callable[[Array], Array] = np.a
     for vector, mode in zip(vectors, modes, strict=True):
         vector.array[:] = turn(mode.ravel())
     _orthonormalise(vectors)
-    return PETSc.NullSpace().create(vectors=vectors, comm=V.mesh.comm)
+    return PETSc.NullSpace().create(vectors=vectors, comm=vectors[0].comm)
 
 
 def rigid_motions(x: NDArray[np.float64]) -> NDArray[np.float64]:

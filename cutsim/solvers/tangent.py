@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 from dolfinx import fem, la
-from dolfinx.cpp.la.petsc import create_matrix
 from dolfinx.fem import petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from cutsim.base import compat
+from cutsim.base.assembly import empty_matrix
+from cutsim.base.lifetime import petsc_comm
 from cutsim.base.terms import Assembler
 from cutsim.solvers.directions import Directions
 from cutsim.solvers.preconditioners import rigid_body_modes
@@ -46,17 +47,17 @@ class Tangent:
         self._a, self._V, self._symmetric, self._assemblers = tuple(a), V, symmetric, tuple(assemblers)
         self._directions = directions or Directions(V)
         self.drag: NDArray[np.float64] | None = None
-        pattern = compat.sparsity_pattern(self._a)
-        pattern.finalize()
         if V.mesh.comm.size == 1:
+            pattern = compat.sparsity_pattern(self._a)
+            pattern.finalize()
             self._csr = la.matrix_csr(pattern, block_mode=la.BlockMode.expanded)
             n = len(self._csr.indptr) - 1
             arrays = self._csr.indptr.astype(PETSc.IntType), self._csr.indices, self._csr.data
-            self._forms = PETSc.Mat().createAIJWithArrays((n, n), arrays, comm=V.mesh.comm)
+            self._forms = PETSc.Mat().createAIJWithArrays((n, n), arrays, comm=petsc_comm(V.mesh.comm))
             self._forms.setBlockSize(V.dofmap.index_map_bs)
         else:
             self._csr = None
-            self._forms = create_matrix(V.mesh.comm, pattern)
+            self._forms = empty_matrix(self._a)
         self._added: PETSc.Mat | None = None
         self.A = self._sum = self._forms
         self._axes = self._directions.matrix() if self._directions else None

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from cutsim.base.arrays import Array
 from cutsim.base.assembly import owned_vector, summed
 from cutsim.base.checks import require
+from cutsim.base.lifetime import petsc_comm
 from cutsim.base.terms import Assembler
 from cutsim.fields.state import State
 from cutsim.tools.driven_tool import DrivenPart, MachineAxes, owned_dofs
@@ -50,7 +51,7 @@ class DrivenAssembler(DrivenPart):
         self._f = owned_vector(index_map, size)
         self._units = np.tile(axes.shifts, (1, index_map.size_local))
         n, total = index_map.size_local * size, index_map.size_global * size
-        self._tangent = PETSc.Mat().createAIJ(((n, total), (n, total)), comm=state.mesh.comm)
+        self._tangent = PETSc.Mat().createAIJ(((n, total), (n, total)), comm=petsc_comm(state.mesh.comm))
         self._tangent.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
         self._tangent.setUp()
         contact.add_pattern(self._tangent)

@@ -23,7 +23,24 @@ def free_dropped(comm: MPI.Comm) -> None:
     """
     if next(_made) % _COLLECT == 0:
         gc.collect()
-    PETSc.garbage_cleanup(comm)
+    PETSc.garbage_cleanup(petsc_comm(comm))
+
+
+def petsc_comm(comm: MPI.Comm) -> MPI.Comm:
+    """The communicator on which PETSc objects are made: that of all processes, where the mesh is on all of them.
+
+    Each mesh and each of its index maps has a communicator of its own. PETSc would add one of its own to each, and on
+    several ranks it frees what Python has dropped by communicator: what was made on that of a mesh which is gone would
+    stay for ever.
+
+    Args:
+        comm: Communicator of a mesh or of an index map.
+
+    Returns:
+        The communicator of all processes, or `comm` if it holds only some of them.
+    """
+    same = MPI.Comm.Compare(comm, MPI.COMM_WORLD) in (MPI.IDENT, MPI.CONGRUENT)
+    return MPI.COMM_WORLD if same else comm
 
 
 def weakly(method: Callable[..., Any]) -> Callable[..., Any]:
