@@ -104,20 +104,22 @@ def test_body_is_drawn(folder, shape):
 
 @pytest.mark.mpi
 def test_setup_is_drawn_with_all_that_has_a_name(folder, monkeypatch):
+    """Also what is held on nodes that another support holds."""
     b, seen = make_blocks(), []
     monkeypatch.setattr(setup_picture, "save", lambda figure, path: (seen.append(figure), save(figure, path)))
     facets, right = b.face(1, 1.0), b.face(0, 1.0)
     pull = Traction(b.state, right, (1.0, 0.0), lambda t: t, name="wind")
     supports = [Support(b.state, facets, 1, name="lid"), Support(b.state, b.face(1, 0.0), 0)]
+    supports.append(Support(b.state, facets, 0, name="pin"))
     problem = Mechanics(b.state, [b.solid(name="cake"), b.crack(name="cut"), pull], supports)
     draw_setup(folder / "setup.png", problem, supports)
     if MPI.COMM_WORLD.rank > 0:
         assert not seen
         return
     names = [text.get_text() for text in seen[0].legends[0].get_texts()]
-    assert names == ["cake", "cut", "lid: $u_y$", "held: $u_x$", "wind"]
+    assert names == ["cake", "cut", "lid: $u_y$", "held: $u_x$", "pin: $u_x$", "wind"]
     pixels = colours(folder / "setup.png")[0]
-    for colour in distinct(5)[1:]:
+    for colour in distinct(6)[1:]:
         assert np.any(np.abs(pixels[:850] - matplotlib.colors.to_rgb(colour)).max(axis=2) < 0.03)
 
 

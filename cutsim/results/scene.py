@@ -66,6 +66,12 @@ class View:
         back = np.cross(right, up)
         return cls(shown, back if flat else ASIDE @ np.stack([right, up, back]), up)
 
+    @property
+    def back(self) -> Array:
+        """Unit vector from the body to the eye."""
+        towards = np.asarray(self.towards, dtype=float)
+        return towards / np.linalg.norm(towards)
+
     def aim(self, camera: Any, aspect: float) -> float:
         """Aim a camera so that the points fill the picture; returns the height that is seen [length].
 
@@ -73,7 +79,7 @@ class View:
             camera: The camera of pyvista.
             aspect: Width of the picture over its height.
         """
-        back = np.asarray(self.towards, dtype=float) / np.linalg.norm(self.towards)
+        back = self.back
         right = np.cross(np.asarray(self.up, dtype=float), back)
         right /= np.linalg.norm(right)
         axes = np.stack([right, np.cross(back, right), back])
@@ -107,6 +113,7 @@ class Scene:
         self._size, self._flat, self._width = size, flat, size[0] / _WIDTH
         self._plotter = pyvista.Plotter(off_screen=True, window_size=size, lighting="light kit")
         self._plotter.enable_anti_aliasing("ssaa")
+        self._marks: list[tuple[Array, Any, float]] = []
 
     def add_body(
         self,
@@ -144,11 +151,9 @@ class Scene:
             _bring_forward(self._plotter.add_mesh(faces, color=colour, line_width=5 * self._width, lighting=False))
 
     def add_nodes(self, points: Array, colour: Any, diameter: float) -> None:
-        """Mark some nodes by dots of a diameter [pixels in a picture 1600 wide]."""
+        """Mark some nodes by dots of a diameter [pixels in a picture 1600 wide]; later ones lie on earlier ones."""
         if len(points):
-            self._plotter.add_points(
-                points, color=colour, point_size=diameter * self._width, render_points_as_spheres=True, lighting=False
-            )
+            self._marks.append((points, colour, diameter * self._width))
 
     def add_tool(self, tool: pyvista.PolyData) -> None:
         """Add rigid tools."""
@@ -165,9 +170,20 @@ class Scene:
         """
         width, height = self._size
         seen = view.aim(self._plotter.camera, width / height)
+        self._add_marks(view.back, seen / height)
         self._plotter.reset_camera_clipping_range()
         pixels = self._plotter.screenshot(transparent_background=True, return_img=True)
         return np.asarray(pixels), seen * width / height
+
+    def _add_marks(self, back: Array, pixel: float) -> None:
+        """Draw the dots as discs that face the eye, so far in front of the body that it hides no part of them."""
+        import pyvista
+
+        for number, (points, colour, diameter) in enumerate(self._marks):
+            disc = pyvista.Disc(inner=0.0, outer=0.5 * diameter * pixel, normal=back, c_res=24)
+            front = points + (0.5 * self._marks[0][2] + number) * pixel * back
+            dots = pyvista.PolyData(front).glyph(orient=False, scale=False, geom=disc)
+            self._plotter.add_mesh(dots, color=colour, lighting=False, reset_camera=False)
 
     def __enter__(self) -> Scene:
         return self
