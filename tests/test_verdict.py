@@ -129,6 +129,8 @@ def test_flat_elements_count_by_the_energy_that_they_hold(share):
         # megapascals for the bond, pascals for the body, and the other way round
         (Exponential(strength=0.6, toughness=0.5), 0.777e6, "are both in the same units"),
         (Exponential(strength=0.6e6, toughness=0.5e6), 0.777, "are both in the same units"),
+        # J/m² taken for N/mm
+        (Exponential(strength=0.6, toughness=200.0), 0.777, "more than the whole body"),
         (Exponential(strength=0.6, toughness=0.01), 0.777, "do not resolve the process zone"),
         (TOUGH, E, ""),
     ],

@@ -52,6 +52,11 @@ def global_range(comm: MPI.Comm, values: NDArray[np.float64]) -> tuple[float, fl
     return float(low), float(high)
 
 
+def largest_extent(mesh: Mesh) -> float:
+    """Largest extent of a mesh along an axis [length]. Collective."""
+    return max(high - low for low, high in (global_range(mesh.comm, x) for x in mesh.geometry.x.T))
+
+
 def _shortest_edge(mesh: Mesh, dim: int, entities: NDArray[np.int32]) -> NDArray[np.float64]:
     topology = mesh.topology
     topology.create_entities(1)

@@ -21,7 +21,7 @@ from cutsim.base.terms import Term
 from cutsim.fields.crack_checks import check_cracked
 from cutsim.fields.faces import Face
 from cutsim.fields.points import FacetPoints, Surface, Values
-from cutsim.fields.sizes import facet_size, normal_size
+from cutsim.fields.sizes import facet_size, largest_extent, normal_size
 from cutsim.fields.space import crack_measure_entities
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
@@ -109,7 +109,7 @@ class Crack(Term):
         self.normal_size = self.points.mean(normal_size(state.mesh, self.points.facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
-            doubt_law(state.verdict, name, law, young, self.size)
+            doubt_law(state.verdict, name, law, young, self.size, largest_extent(state.mesh))
         self.history = InterfaceHistory(state.memory, name, self.points, law)
         pressing = self.contact if closing else None
         options = {"current": normal == "current", "augmented": allowed_penetration is not None}

@@ -9,8 +9,8 @@ DEEP = 0.5
 _WEAKEST, _STRONGEST = 1e-5, 1e2
 
 
-def doubt_law(verdict: Verdict, name: str, law: CohesiveLaw, young: float, size: float) -> None:
-    """Doubt a bond whose strength does not go with the body, or whose process zone the facets do not resolve.
+def doubt_law(verdict: Verdict, name: str, law: CohesiveLaw, young: float, size: float, body: float) -> None:
+    """Doubt a bond whose numbers do not go with the body, or whose process zone the facets do not resolve.
 
     Args:
         verdict: Where to say so.
@@ -18,6 +18,7 @@ def doubt_law(verdict: Verdict, name: str, law: CohesiveLaw, young: float, size:
         law: Its law.
         young: Young's modulus of the softer body [stress].
         size: Mean size of its facets [length].
+        body: Largest extent of the bodies [length].
     """
     ratio = law.strength / young
     if not _WEAKEST <= ratio <= _STRONGEST:
@@ -25,6 +26,12 @@ def doubt_law(verdict: Verdict, name: str, law: CohesiveLaw, young: float, size:
             f"{name}: strength",
             f"{name}: a strength of {law.strength:.3g} is {ratio:.2g} of Young's modulus {young:.3g}: are both in the "
             "same units?",
+        )
+    if law.opening > body:
+        verdict.doubt(
+            f"{name}: opening",
+            f"{name}: the bond is strongest at an opening of {law.opening:.3g}, more than the whole body, {body:.3g}: "
+            "are toughness and strength in the same units?",
         )
     allowed = process_zone_element(law, young)
     if size > allowed:

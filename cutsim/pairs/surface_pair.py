@@ -13,7 +13,7 @@ from cutsim.base.memory import Memory
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.faces import Face, mean_size, rows
-from cutsim.fields.sizes import facet_size, normal_size
+from cutsim.fields.sizes import facet_size, largest_extent, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
@@ -108,7 +108,7 @@ class SurfacePair(Term):
         self.normal_size = mean_size(state.mesh, slaves, normal_size)
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
-            doubt_law(state.verdict, name, law, young, size)
+            doubt_law(state.verdict, name, law, young, size, largest_extent(state.mesh))
         laws = PairLaws(law, self.contact, completed(friction, self.contact.stiffness), allowed_penetration)
         self.sides = Face.joined(slaves), Face.joined(masters or slaves)
         owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
