@@ -221,6 +221,27 @@ def test_a_tool_may_not_begin_behind_the_surface():
 
 
 @pytest.mark.mpi
+@pytest.mark.parametrize("sides", ["", "+", "+-"])
+def test_a_tool_in_faces_of_a_crack_that_it_cannot_touch_is_doubted(sides):
+    """A ball drives in along the crack of a block from its side; a face that another tool touches does not count."""
+    b = make_blocks(n=8)
+    crack, path = b.crack(EXPONENTIAL), ToolPath.polyline([0, 1], [(1.3, 0.5), (0.9, 0.5)])
+    surfaces = [Surface.exterior(b.state, b.face(0, 1.0)), *(Surface.of(b.state, crack.face(side)) for side in sides)]
+    balls = [
+        ToolContact(b.state, Ball(0.2), path, touched, contact=PenaltyContact(20.0), name=f"ball{i}")
+        for i, touched in enumerate((surfaces[:1], surfaces))
+    ]
+    Mechanics(b.state, [b.solid(), crack, *balls], [Support(b.state, b.face(0, 0.0), i) for i in (0, 1)])
+    b.state.begin(1.0)
+    for ball in balls:
+        ball.begin()
+        ball.watch()
+    # the point nearest to the middle of the ball is 0.19 deep
+    words = "faces of cracks are in the tool by 1.5 of the mesh size, unresisted"
+    assert (words in " ".join(b.state.verdict.reasons)) == (sides != "+-")
+
+
+@pytest.mark.mpi
 def test_coarse_mesh_is_named_with_numbers(caplog):
     b = make_blocks(n=8)
     top = Surface.exterior(b.state, b.face(1, 1.0))

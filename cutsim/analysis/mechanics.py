@@ -49,6 +49,7 @@ from cutsim.fields.twins import unjoined
 from cutsim.solvers.balance import Balance
 from cutsim.solvers.convergence import TOLERANCES, Criteria, Tolerances
 from cutsim.solvers.iterations import Outcome
+from cutsim.tools.left_out import tell_left_out
 
 # displacement over the size of the mesh at which a solve is given up
 _RUNAWAY = 100.0
@@ -279,9 +280,10 @@ def _settled(terms: Sequence[Term], solve: Callable[[], Outcome]) -> Outcome:
 
 
 def _check_places(state: State, terms: Sequence[Term]) -> None:
-    """Refuse solids that share cells and cracks that share facets, and doubt gaps in these. Collective."""
+    """Refuse solids that share cells and cracks that share facets, doubt gaps in these, watch faces. Collective."""
     check_disjoint(state.mesh, offering(terms, Body))
     check_cracks(state, offering(terms, Bonded), offering(terms, Joining))
+    tell_left_out(state, terms)
 
 
 def _interface_nodes(state: State, interfaces: Sequence[Interface]) -> NDArray[np.int32]:

@@ -8,6 +8,7 @@ from dolfinx.mesh import Mesh, entities_to_geometry
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.assembly import box
 from cutsim.base.compat import geometry_nodes
 
 
@@ -54,7 +55,8 @@ def global_range(comm: MPI.Comm, values: NDArray[np.float64]) -> tuple[float, fl
 
 def largest_extent(mesh: Mesh) -> float:
     """Largest extent of a mesh along an axis [length]. Collective."""
-    return max(high - low for low, high in (global_range(mesh.comm, x) for x in mesh.geometry.x.T))
+    low, high = box(mesh.comm, mesh.geometry.x)
+    return float((high - low).max())
 
 
 def _shortest_edge(mesh: Mesh, dim: int, entities: NDArray[np.int32]) -> NDArray[np.float64]:

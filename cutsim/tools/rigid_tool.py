@@ -178,6 +178,9 @@ class RigidTool(Term, ABC):
             self.state.verdict.withdraw(self._untouched)
         doubt_penetration(self.state.verdict, self.name, depth, self.blend)
 
+    def leave_out(self, faces: Surface) -> None:
+        """Note faces of cracks that no tool can touch; some tools look whether they are in them. Collective."""
+
     def may_miss(self) -> None:
         """Say that a run is to be trusted also if the tool does not come to these surfaces of the body."""
         self.state.verdict.withdraw(self._untouched)

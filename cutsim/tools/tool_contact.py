@@ -20,6 +20,7 @@ from cutsim.fields.points import Surface, Values
 from cutsim.fields.sizes import facet_size, normal_size
 from cutsim.fields.state import State
 from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.doubts import DEEP
 from cutsim.interface.multiplier import ContactMultiplier
 from cutsim.interface.rubbing import AnyFriction, Friction, Rubbing, check_friction, completed, hotter
 from cutsim.interface.slip import SlipHistory
@@ -241,6 +242,7 @@ class ToolContact(RigidTool):
                 entity_maps=self.entity_maps,
             )
             self.carriage.border.add(part)
+        self._left_out: Patch | None = None
         self._passing = Passing(self, self.patches)
         self._doubt_resolution()
 
@@ -299,6 +301,23 @@ class ToolContact(RigidTool):
     def penetration(self) -> float:
         """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""
         return max(p.penetration() for p in self.patches)
+
+    def leave_out(self, faces: Surface) -> None:
+        """Note faces of cracks that no tool can touch, to look whether they come into this one. Collective."""
+        laws, pose = ToolLaws(self.contact, None, None), (self.position, self.rotation)
+        self._left_out = Patch(self.state, self.name, faces, self.shape, pose, laws, self.temperature)
+
+    def watch(self) -> None:
+        """Doubt a tool that lies deep in the body, also where nothing resists it. Collective."""
+        super().watch()
+        depth = -np.inf if self._left_out is None else self._left_out.penetration()
+        if depth > DEEP:
+            self.state.verdict.doubt(
+                f"{self.name}: left out",
+                f"{self.name}: faces of cracks are in the tool by {depth:.2g} of the mesh size, unresisted: add them "
+                "to its surfaces, such as 'crack+' and 'crack-'",
+                depth,
+            )
 
     def energies(self) -> dict[str, float]:
         """Energy of the contact penalties and friction work so far. Collective.
