@@ -20,12 +20,13 @@ from typer.testing import CliRunner
 
 import cutsim
 from cutsim.analysis.steps import StepError
-from cutsim.cases import built_in
+from cutsim.cases import RunOutcome, built_in
 from cutsim.cases.importing.draft import Imported
 from cutsim.commands import launch, new
 from cutsim.commands.endings import Ending, endings
 from cutsim.commands.jobs import Job, Runner
 from cutsim.commands.main import COMMANDS, app
+from cutsim.commands.run import end
 from cutsim.commands.variation import Variation, variants
 from cutsim.results.output import read_history
 
@@ -85,6 +86,15 @@ def test_errors_end_by_their_code(error, ending, capsys):
     assert end.value.exit_code == ending
     said = capsys.readouterr().err
     assert str(error) in said and ("Traceback" in said) == (ending is Ending.INTERNAL)
+
+
+def test_a_quiet_run_says_why_it_is_questionable(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("cutsim.commands.run.quiet", lambda: True)
+    for reasons in (), ("coarse", "soft"):
+        with pytest.raises(typer.Exit) as ended:
+            end(RunOutcome(tmp_path, "questionable" if reasons else "trusted", reasons))
+        assert ended.value.exit_code == (Ending.QUESTIONABLE if reasons else 0)
+    assert capsys.readouterr() == ("", "questionable: coarse\nquestionable: soft\n")
 
 
 def test_ranks_keep_the_exit_status_and_end_together(tmp_path):

@@ -58,6 +58,9 @@ def end(outcome: RunOutcome) -> NoReturn:
         say(str(outcome.error))
     if ending is Ending.NO_EQUILIBRIUM:
         say(_ADVICE)
+    elif quiet():  # otherwise they have been warned of, and the progress ends with them
+        for reason in outcome.reasons:
+            say(f"questionable: {reason}")
     if not quiet() and first_rank():
         hint = f"; cutsim resume {outcome.folder} goes on" if ending is Ending.INTERRUPTED else ""
         console().print(f"results: {outcome.folder}{hint}", markup=False)
