@@ -223,6 +223,8 @@ def test_units(value, unit, units, expected):
         (GOOD, {"columns": {"force": ("Standard force", "kPx")}}, r"unit of column 'Standard force' = 'kPx'"),
         (GOOD, {"columns": {"force": ("Standard force", "ampere")}}, r"unit of column .* = 'ampere'"),
         (GOOD, {"columns": {"force": ("Standard force", "")}, "increasing": "x"}, r"increasing = 'x' .* one of force"),
+        (GOOD, {"columns": {"force": "F"}}, r"columns\['force'\] = 'F' .* must be 2 values, each a string"),
+        (GOOD, {"columns": {"force": ("F",)}}, r"columns\['force'\] = \('F',\) .* must be 2 values, each a string"),
         ("Strain;Standard force\n1;2", {}, r"number of lines .* = 2 .* at least two lines of numbers"),
     ],
 )

@@ -72,9 +72,11 @@ def _fits(value: Any, hint: Any) -> bool:
     if origin is not None and issubclass(origin, Sequence):
         if parts[0] in _NUMBERS:
             return isinstance(value, tuple | list | np.ndarray)
-        return isinstance(value, origin | list | tuple) and all(_fits(entry, parts[0]) for entry in value)
+        count = len(parts) if origin is tuple and Ellipsis not in parts else None
+        fits = isinstance(value, origin | list | tuple) and all(_fits(entry, parts[0]) for entry in value)
+        return fits and count in (None, len(value))
     if origin is not None and issubclass(origin, Mapping):
-        return isinstance(value, Mapping)
+        return isinstance(value, Mapping) and all(_fits(entry, parts[1]) for entry in value.values())
     if origin is not None:
         return callable(value)
     if hint is bool:
@@ -85,11 +87,15 @@ def _fits(value: Any, hint: Any) -> bool:
 
 
 def _refused(name: str, value: Any, hint: Any) -> Refused:
-    """What to raise for an argument that does not fit; for a sequence of objects it names the entry that is none."""
+    """What to raise for an argument that does not fit; it names the entry of a sequence or mapping that is none."""
     hint = _resolved(hint)
     parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     for part in parts:
         kind = get_origin(part)
+        if inspect.isclass(kind) and issubclass(kind, Mapping) and isinstance(value, Mapping):
+            for key, entry in value.items():
+                if not _fits(entry, get_args(part)[1]):
+                    return Refused(f"{name}[{key!r}]", entry, _words(get_args(part)[1]))
         if inspect.isclass(kind) and issubclass(kind, Sequence) and isinstance(value, list | tuple):
             for i, entry in enumerate(value):
                 if not _fits(entry, get_args(part)[0]):
@@ -123,6 +129,8 @@ def _words(hint: Any) -> str:
         return " or ".join(repr(part) for part in parts)
     if origin is np.ndarray:
         return "an array"
+    if origin is tuple and Ellipsis not in parts and parts[0] not in _NUMBERS:
+        return f"{len(parts)} values, each {_words(parts[0])}"
     if origin is not None and issubclass(origin, Sequence):
         return f"a sequence, each {_words(parts[0])}"
     if origin is not None:
