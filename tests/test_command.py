@@ -206,6 +206,13 @@ def test_an_imported_model_says_what_is_not_translated(tmp_path, monkeypatch):
     assert runner.invoke(app, ["import", "model.feb", "-o", str(path)]).exit_code == Ending.BAD_INPUT
 
 
+def test_a_case_is_no_model(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text("title = 'a case'")
+    result = runner.invoke(app, ["import", "mine.toml"])
+    assert result.exit_code == Ending.BAD_INPUT and "FEBio (.feb) or Abaqus (.inp)" in result.stderr
+
+
 def test_variations():
     assert Variation.of("tool.friction=0.1:0.4:4").values == ("0.1", "0.2", "0.3", "0.4")
     assert Variation.of("law.toughness=1:100:3:log").values == ("1", "10", "100")

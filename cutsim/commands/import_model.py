@@ -25,9 +25,9 @@ def command(
     """
     from cutsim.cases.importing.model_files import import_model
 
-    path = free_path(output or Path(f"{model.stem}.toml"), overwrite=overwrite)
-    imported = import_model(model, path.parent)
-    imported.write(path)
+    path = output or Path(f"{model.stem}.toml")
+    imported = import_model(model, path.parent)  # first, since a case that is taken for a model has the same name
+    imported.write(free_path(path, overwrite=overwrite))
     screen = console()
     for words, lines in {"not translated": imported.untranslated, "not exactly": imported.differences}.items():
         for line in lines:
