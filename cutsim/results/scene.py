@@ -33,6 +33,8 @@ _FILLED = 0.92
 # light on a body: in a plane problem its colours are exactly those of the bar
 _FLAT = {"ambient": 0.0, "diffuse": 1.0, "specular": 0.0}
 _LIT = {"ambient": 0.35, "diffuse": 0.75, "specular": 0.1}
+# distance of marks from the body over the diameter of the largest: half the tangent of the steepest view of a face
+_AHEAD = 1.5
 # width of a picture for which lines and marks are given [pixels]
 _WIDTH = 1600
 # sharp edges are drawn: those at which the surface turns by more than this angle [°]
@@ -181,7 +183,7 @@ class Scene:
 
         for number, (points, colour, diameter) in enumerate(self._marks):
             disc = pyvista.Disc(inner=0.0, outer=0.5 * diameter * pixel, normal=back, c_res=24)
-            front = points + (0.5 * self._marks[0][2] + number) * pixel * back
+            front = points + (_AHEAD * self._marks[0][2] + number) * pixel * back
             dots = pyvista.PolyData(front).glyph(orient=False, scale=False, geom=disc)
             self._plotter.add_mesh(dots, color=colour, lighting=False, reset_camera=False)
 
