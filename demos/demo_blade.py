@@ -30,7 +30,7 @@ from mpi4py import MPI
 from cutsim import Blade, Exponential, NeoHookean
 
 quick = "--quick" in sys.argv  # a coarse mesh and half of the depth
-edge, radius, depth = (0.3, 0.3, 1.6) if quick else (0.2, 0.2, 3.4)  # element size, tip radius, depth of the cut [mm]
+edge, radius, depth = (0.3, 0.3, 1.6) if quick else (0.19, 0.2, 3.4)  # element size, tip radius, depth of the cut [mm]
 
 # ## Silicone, bond and blade
 #
@@ -52,7 +52,7 @@ friction = 0.0
 
 from cutsim import cracked_block, geometry, read_geo
 
-layers, band, growth = (3, 0.6, 1.6) if quick else (8, 1.0, 1.25)
+layers, band, growth = (3, 0.6, 1.6) if quick else (6, 0.76, 1.5)
 size = dict(dim=3, sym=1, lc=edge, band=band, growth=growth, nz=layers, notch=0.6)
 domain = read_geo(geometry("block"), MPI.COMM_WORLD, size)
 block = cracked_block(domain, silicone, bond, viscosity=0.002)
@@ -93,7 +93,8 @@ result = {
     "largest_imbalance": history["imbalance"][way > start].max(),
 }
 recording.summary(result)
-draw_insertion("results/blade/cut.png", cut, mirror=("z",))
+near = (-8.0, 8.0, -4.2, 1.0, -5.05, 5.05)  # mm; the block is 60 mm long
+draw_insertion("results/blade/cut.png", cut, mirror=("z",), window=near)
 if MPI.COMM_WORLD.rank == 0:
     print(*(f"{name}: {value:.5g}" for name, value in result.items()), sep="\n")
     labels = dict(xlabel="depth of the tip [mm]", ylabel="force [N]", title="Blade cutting of silicone")

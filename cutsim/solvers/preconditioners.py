@@ -19,7 +19,7 @@ DIRECT_LIMIT_CRACK = {1: 1_000_000, 2: 100_000, 3: 60_000}
 #: make than MUMPS's, the more so the larger it is, but half the time to apply, and it is applied twenty times.
 NATIVE_LIMIT = 25_000
 #: Unknowns of a body in space with a crack from which a kept factor of half the size is faster ...
-FACTOR_FROM = 20_000
+FACTOR_FROM = 10_000
 #: ... and up to which: operations of a factorisation grow with their square, those of multigrid in proportion.
 FACTOR_LIMIT = 2_000_000
 #: Unknowns up to which a factorisation is worth trying when everything else failed.
