@@ -88,6 +88,18 @@ def test_a_quick_validation_has_its_own_tolerance_and_leaves_the_page(checkout):
     assert "old" in (checkout / "docs" / "validation.md").read_text()
 
 
+def test_pictures_of_a_run_become_figures_of_the_pages(checkout):
+    """Those of the level that counts; one that is missing is named."""
+    rows = checkout / "tests/validation/rows/10-loads.toml"
+    key = 'study = [{ size = 2 }, { size = 1 }]\nfigures = { pressed = "sub/body.png", bent = "bent.png" }'
+    rows.write_text(ROWS.replace('program = "press"', f'program = "press"\n{key}'))
+    drawn = '(folder / "sub").mkdir(exist_ok=True)\n(folder / "sub" / "body.png").write_text(sys.argv[2])\n'
+    (checkout / "tests/validation/press.py").write_text(PROGRAM.format(force=5.0) + drawn)
+    result = CliRunner().invoke(app, ["validate"])
+    assert (checkout / "docs/figures/pressed.png").read_text() == "1"
+    assert "figure bent: press has left no bent.png" in result.stdout
+
+
 def test_runs_that_there_are_not_are_named(checkout):
     result = CliRunner().invoke(app, ["validate", "--only", "hammer"])
     assert result.exit_code == 2 and "there are press" in result.stderr

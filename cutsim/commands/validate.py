@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from cutsim.validation.results import Result
     from cutsim.validation.rows import Group, Run
 
+_FULL, _QUICK = (Path("results/validation") / name for name in ("full", "quick"))
 EXAMPLES = (
     "cutsim validate --quick -j 2",
     "cutsim validate --only dcb --only hertz",
@@ -54,6 +55,7 @@ def command(
     screen = console()
     found = _results(chosen, folder, jobs, quick=quick, screen=screen)
     if not quick:
+        _copy_figures(chosen, docs, screen)
         _write(read_rows(folder / "rows"), found, folder, docs)  # anew: a run takes minutes, in which rows may be added
     outside = [result for result in found if not result.inside]
     if found:
@@ -116,7 +118,7 @@ def _results(runs: Sequence[Run], folder: Path, jobs: int, *, quick: bool, scree
     from cutsim.results.run_files import RunFiles
     from cutsim.validation.results import Level, judge
 
-    base = Path("results/validation") / ("quick" if quick else "full")
+    base = _QUICK if quick else _FULL
     levels = {run.name: _jobs(run, folder, base, quick=quick) for run in runs}
     statuses = dict[Path, int]()
 
@@ -164,6 +166,18 @@ def _command(run: Run, changes: dict[str, Any], folder: Path, target: Path, *, q
         return (str(folder / f"{run.program}.py"), *run.arguments, *options, *reduced, "--out", str(target))
     sets = [part for key, value in changes.items() for part in ("--set", f"{key}={value}")]
     return ("-m", "cutsim", "run", run.case, *sets, *reduced, "-o", str(target), "--overwrite")
+
+
+def _copy_figures(runs: Sequence[Run], docs: Path, screen: Console) -> None:
+    """Copy the pictures of runs that are figures of the pages, and name those that are missing."""
+    (docs / "figures").mkdir(exist_ok=True)
+    for run in runs:
+        for name, picture in run.figures.items():
+            source = _levels(run, _FULL, quick=False)[-1][1] / picture
+            if source.exists():
+                shutil.copyfile(source, docs / "figures" / f"{name}{source.suffix}")
+            else:
+                screen.print(f"figure {name}: {run.name} has left no {picture}", markup=False)
 
 
 def _write(groups: Sequence[Group], found: Sequence[Result], folder: Path, docs: Path) -> None:

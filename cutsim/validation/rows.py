@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 _Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9-]*$")]
+_FileName = Annotated[str, Field(pattern=r"^[a-z0-9_]+$")]
 _Text = Annotated[str, Field(min_length=1)]
 
 
@@ -69,6 +70,7 @@ class Run(_Table):
         arguments: Arguments of the program.
         study: Further changes of the case or options of the program, one table for each mesh or step, from the coarsest
             to the finest, which counts; a quick program has its own mesh and leaves them out.
+        figures: Names of figures of the pages, and the pictures of the level that counts which they are copies of.
         row: The rows.
     """
 
@@ -78,6 +80,7 @@ class Run(_Table):
     set: dict[str, Any] = {}
     arguments: list[str] = []
     study: list[dict[str, Any]] = []
+    figures: dict[_FileName, _Text] = {}
     row: Annotated[list[Row], Field(min_length=1)]
 
     @model_validator(mode="after")
