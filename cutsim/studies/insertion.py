@@ -238,6 +238,8 @@ def _contacts(
                 name=name,
                 machines=() if carriage is None else carriage,
             )
+            if whole:  # the face of the thread, which does not meet it
+                contact.destroys()
             if crack is not body.cracks[0]:  # how deep the cut will go is not known
                 contact.may_miss()
             found.append(contact)

@@ -243,6 +243,7 @@ class ToolContact(RigidTool):
             )
             self.carriage.border.add(part)
         self._left_out: Patch | None = None
+        self._destroys = False
         self._passing = Passing(self, self.patches)
         self._doubt_resolution()
 
@@ -304,8 +305,14 @@ class ToolContact(RigidTool):
 
     def leave_out(self, faces: Surface) -> None:
         """Note faces of cracks that no tool can touch, to look whether they come into this one. Collective."""
+        if self._destroys:
+            return
         laws, pose = ToolLaws(self.contact, None, None), (self.position, self.rotation)
         self._left_out = Patch(self.state, self.name, faces, self.shape, pose, laws, self.temperature)
+
+    def destroys(self) -> None:
+        """Say that a run is to be trusted also if faces that it cannot touch come into it, as it destroys them."""
+        self._destroys = True
 
     def watch(self) -> None:
         """Doubt a tool that lies deep in the body, also where nothing resists it. Collective."""
