@@ -441,3 +441,6 @@ def test_a_material_is_fitted(tmp_path):
     assert material["model"] == "neo-hookean" and material["young"] == pytest.approx(1.495)  # 2 (1 + nu) 0.5
     assert snippet.with_suffix(".png").exists()
     assert runner.invoke(app, ["fit-material", *arguments, "--model", "neo"]).exit_code == 2
+    for given, wanted in ((arguments[:1], "A travel needs --length"), (arguments[:3], "A force needs --area")):
+        without = runner.invoke(app, ["fit-material", *given, "--model", "neo-hookean"])
+        assert without.exit_code == 2 and wanted in without.stderr

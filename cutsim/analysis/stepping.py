@@ -304,11 +304,12 @@ def _no_step(problem: Problem, control: Control, report: StepReport) -> StepErro
     """The end of a run in which no step succeeds."""
     start, obstacles = problem.state.time_old, {carrier.name: carrier.obstacle for carrier in problem.carriers}
     unused = [f"No {name} carries the run on: {why}" for name in control.jumps if (why := obstacles.get(name))]
-    advice = [unfollowed(problem, control), *unused, problem.advise()]
+    found = [unfollowed(problem, control), *unused, problem.advise()]
+    advice = [words[0].upper() + words[1:] for words in found if words]
     problem.state.verdict.suppose("ended", f"no step succeeds from time {start:.6g} on", aloud=True)
     return StepError(
         f"no step from time {start:.6g} of {report.dt:.3g} or more succeeds "
-        f"(smallest = {control.smallest:.3g}): {report.refusal}" + "".join(f". {words}" for words in advice if words)
+        f"(smallest = {control.smallest:.3g}): {report.refusal}" + "".join(f". {words}" for words in advice)
     )
 
 

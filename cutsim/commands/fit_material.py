@@ -104,24 +104,32 @@ def command(
 
 def _stretch(path: Path, title: str | None, length: float | None) -> Vector:
     """Stretches of a test."""
-    from cutsim.commands.folders import read_columns
     from cutsim.identify import titled_units
 
     if length is not None:
-        (travel,) = read_columns(path, {"displacement": title})
-        return 1 + travel.values / length
+        return 1 + _values(path, "displacement", title) / length
     named = [title] if title else titled_units(path)
     kind = "stretch" if any("stretch" in name.lower() for name in named) else "strain"
-    (column,) = read_columns(path, {kind: title})
-    return column.values if kind == "stretch" else 1 + column.values
+    values = _values(path, kind, title, "A travel needs --length, that of the specimen")
+    return values if kind == "stretch" else 1 + values
 
 
 def _stress(path: Path, title: str | None, area: float | None) -> Vector:
     """Nominal stresses of a test [MPa]."""
+    if area is not None:
+        return _values(path, "force", title) / area
+    return _values(path, "stress", title, "A force needs --area, that of the specimen")
+
+
+def _values(path: Path, quantity: str, title: str | None, otherwise: str = "") -> Vector:
+    """A column of a table; where there is none, what may be given instead is said."""
     from cutsim.commands.folders import read_columns
 
-    (column,) = read_columns(path, {"force" if area else "stress": title})
-    return column.values / (area or 1.0)
+    try:
+        (column,) = read_columns(path, {quantity: title})
+    except ValueError as error:
+        raise ValueError(f"{error}. {otherwise}" if otherwise else str(error)) from error
+    return column.values
 
 
 def _shear(test: StressTest) -> float:
