@@ -46,6 +46,7 @@ from cutsim.fields.cells import check_disjoint
 from cutsim.fields.crack_checks import check_cracks
 from cutsim.fields.state import State
 from cutsim.fields.twins import unjoined
+from cutsim.pairs.self_intersection import SelfIntersection
 from cutsim.solvers.balance import Balance
 from cutsim.solvers.convergence import TOLERANCES, Criteria, Tolerances
 from cutsim.solvers.iterations import Outcome
@@ -134,6 +135,7 @@ class Mechanics(Balance[Term, Support]):
         kinds: tuple[type[Brake], type[JumpDynamics]] = (Brake, JumpDynamics)
         self.carriers: tuple[Carrier, ...] = tuple(kind(self.problem, state, terms) for kind in kinds if static)
         self._resisted = state.memory.value("mechanics: viscous work, and what is not set free by the body", (0.0, 0.0))
+        self._intersection = SelfIntersection(state)
         self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
     @property
@@ -244,6 +246,7 @@ class Mechanics(Balance[Term, Support]):
         for carrier in self.carriers:
             warn_of_jump(carrier.name, carrier.entry, self.audit, self.trial_audit, self.state.time)
         doubt_way_back(self.state, self.audit, self.trial_audit)
+        self._intersection.watch()
 
     def reaction(self, held: Support) -> float:
         """Reaction of a support along its direction in the trial state [force]. Collective."""

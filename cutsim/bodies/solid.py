@@ -8,7 +8,7 @@ import ufl
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import integrate
-from cutsim.base.checks import nonnegative, positive, require, require_number
+from cutsim.base.checks import nonnegative, place, positive, require, require_number
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
@@ -194,7 +194,16 @@ class Solid(Term):
         return sum(part.regularising_work for part in self.contributions)
 
     def watch(self) -> None:
-        """Doubt elements that are almost flat if they hold a part of the strain energy that counts. Collective."""
+        """Doubt elements that are folded, or flat and hold a part of the strain energy that counts. Collective."""
+        turned = self._volume.turned()
+        if turned is not None:
+            share = turned.energy / integrate(self._energy_form)
+            self.state.verdict.doubt(
+                f"{self.name}: folded",
+                f"{self.name}: elements that are turned over at a corner, as at {place(turned.place)} with "
+                f"J = {turned.smallest:.2g}, hold {share:.1%} of the strain energy: see what smaller ones change",
+                share,
+            )
         smallest = self.smallest_jacobian()
         if not smallest < _FLAT:
             return

@@ -1,5 +1,6 @@
 """Smallest volume ratio of a body, which tells how near its elements are to inversion."""
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import basix
@@ -12,6 +13,21 @@ from numpy.typing import NDArray
 from cutsim.base.assembly import integrate
 from cutsim.base.compat import evaluate, expression, form
 from cutsim.bodies.formulations import Cells, Formulation
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Elements that are turned over at a node.
+
+    Attributes:
+        smallest: The smallest volume ratio at a node, < 0.
+        place: Where this node is in the reference configuration [length].
+        energy: Strain energy that all such elements hold [energy].
+    """
+
+    smallest: float
+    place: NDArray[np.float64]
+    energy: float
 
 
 class VolumeRatio:
@@ -33,7 +49,33 @@ class VolumeRatio:
 
     def held_below(self, ratio: float) -> float:
         """Strain energy of the elements that have a point at which the ratio is below this [energy]. Collective."""
-        self._counted.x.array[self._owned] = self._least < ratio
+        return self._held(self._least < ratio)
+
+    def turned(self) -> Turned | None:
+        """Elements that are turned over at a node. Collective.
+
+        Out of the plane, and around an axis of revolution, nothing turns over: what counts there is the plane.
+
+        Returns:
+            None if there is no such element, or if none can be turned over at a node without being so everywhere.
+        """
+        if self._at_nodes is None:
+            return None
+        state = self._elasticity.state
+        values = evaluate(self._at_nodes, state.mesh, self._owned)
+        found: tuple[float, list[float]] = (0.0, [])
+        if values.min(initial=0.0) < 0:
+            cell, node = np.unravel_index(values.argmin(), values.shape)
+            at = state.V.dofmap.list[self._owned[cell], node]
+            found = float(values[cell, node]), state.V.tabulate_dof_coordinates()[at].tolist()
+        smallest, place = min(state.mesh.comm.allgather(found))
+        if not place:
+            return None
+        return Turned(smallest, np.array(place[: state.mesh.geometry.dim]), self._held(values.min(axis=1) < 0))
+
+    def _held(self, where: NDArray[np.bool_]) -> float:
+        """Strain energy of some of the owned cells of the body [energy]. Collective."""
+        self._counted.x.array[self._owned] = where
         return integrate(self._energy)
 
     @property
@@ -54,6 +96,17 @@ class VolumeRatio:
         cell = basix.CellType[state.mesh.topology.cell_name()]
         points = basix.make_quadrature(cell, self._formulation.measures[0].metadata()["quadrature_degree"])[0]
         return expression(ufl.det(self._elasticity.deformation_gradient(state.u)), points, state.mesh)
+
+    @cached_property
+    def _at_nodes(self) -> fem.Expression | None:
+        """The ratio in the plane or in space at the nodes; None where it is the same all over an element."""
+        state = self._elasticity.state
+        element = state.V.element.basix_element
+        simplex = element.cell_type in (basix.CellType.triangle, basix.CellType.tetrahedron)
+        if simplex and element.degree == 1:
+            return None
+        F = ufl.Identity(state.mesh.geometry.dim) + ufl.grad(state.u)
+        return expression(ufl.det(F), element.points, state.mesh)
 
     @cached_property
     def _counted(self) -> fem.Function:

@@ -53,21 +53,12 @@ class ContactSurfaces:
         require("bodies", bodies, len(bodies) > 0, "at least one body")
         state, mesh = bodies[0].state, bodies[0].state.mesh
         require("bodies", bodies, all(b.state is state for b in bodies), "bodies of one state")
-        tdim = mesh.topology.dim
-        mesh.topology.create_connectivity(tdim - 1, tdim)
-        facet_map, cell_map = mesh.topology.index_map(tdim - 1), mesh.topology.index_map(tdim)
-        outer = np.zeros(facet_map.size_local + facet_map.num_ghosts, dtype=np.int32)
-        outer[exterior_facet_indices(mesh.topology)] = 1
-        cracked = vars(state.V).get(CRACKED, np.zeros(len(outer), dtype=bool)).copy()
-        named = np.empty(0, dtype=np.int32) if without is None else np.asarray(without, dtype=np.int32)
-        left = ~marks(mesh.comm, facet_map, named, "without")
+        cell_map = mesh.topology.index_map(mesh.topology.dim)
         filled = np.zeros(cell_map.size_local + cell_map.num_ghosts, dtype=np.int32)
         for body in bodies:
             filled[slice(None) if body.cells is None else body.cells] = 1
         filled = sum_over_ranks(cell_map, filled)
-        cut = np.flatnonzero((cracked & left)[: facet_map.size_local]).astype(np.int32)
-        surface = np.flatnonzero((sum_over_ranks(facet_map, outer) > 0) & left).astype(np.int32)
-        found = [Face.outer(mesh, surface), *Face.both(mesh, cut)]
+        found = all_faces(state, without)
         faces = [face.some(np.flatnonzero(filled[face.cells])) for face in found]
         there = [face for face in faces if mesh.comm.allreduce(len(face.facets))]
         return cls(state, tuple(there), min(body.material.young for body in bodies))
@@ -79,3 +70,26 @@ class ContactSurfaces:
             **options: Further arguments of `SurfacePair`, such as ``friction=0.3``.
         """
         return SurfacePair(self.state, self.faces, **{"young": self.young, **options})
+
+
+def all_faces(state: State, without: NDArray[np.int32] | None = None) -> tuple[Face, ...]:
+    """The outer boundary of a mesh, and both faces of all facets along which the displacement may jump. Collective.
+
+    Args:
+        state: Displacement and time.
+        without: Local facets that are left out.
+
+    Raises:
+        ValueError: What is left out is no facet of the mesh.
+    """
+    mesh, tdim = state.mesh, state.mesh.topology.dim
+    mesh.topology.create_connectivity(tdim - 1, tdim)
+    facet_map = mesh.topology.index_map(tdim - 1)
+    outer = np.zeros(facet_map.size_local + facet_map.num_ghosts, dtype=np.int32)
+    outer[exterior_facet_indices(mesh.topology)] = 1
+    cracked = vars(state.V).get(CRACKED, np.zeros(len(outer), dtype=bool))
+    named = np.empty(0, dtype=np.int32) if without is None else np.asarray(without, dtype=np.int32)
+    left = ~marks(mesh.comm, facet_map, named, "without")
+    cut = np.flatnonzero((cracked & left)[: facet_map.size_local]).astype(np.int32)
+    surface = np.flatnonzero((sum_over_ranks(facet_map, outer) > 0) & left).astype(np.int32)
+    return Face.outer(mesh, surface), *Face.both(mesh, cut)

@@ -1,0 +1,75 @@
+"""Elements that are folded, and bodies whose surface passes through itself, make a run questionable."""
+
+import numpy as np
+import pytest
+from dolfinx import fem, mesh
+from mpi4py import MPI
+
+from cutsim.analysis.mechanics import Mechanics
+from cutsim.analysis.stepping import StepControl, run
+from cutsim.base.compat import cell_partitioner
+from cutsim.bodies.loads import Support
+from cutsim.bodies.solid import Solid
+from cutsim.fields.space import cracked_space
+from cutsim.fields.state import State
+from cutsim.materials.elastic import NeoHookean
+from cutsim.pairs.self_intersection import SelfIntersection
+from helpers.laws import NU, E
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize("moved", [0.45, 0.52])
+def test_an_element_that_is_turned_over_at_a_corner(degree, moved):
+    """The corner (1, 1) moves in by s along the diagonal: u = −s x y (1, 1), and J = 1 − s (x + y)."""
+    domain = mesh.create_unit_square(MPI.COMM_SELF, 1, 1, mesh.CellType.quadrilateral)
+    state = State(fem.functionspace(domain, ("Lagrange", degree, (2,))))
+    solid = Solid(state, NeoHookean(E, NU))
+    state.u.interpolate(lambda x: -moved * x[0] * x[1] * np.ones((2, 1)))
+    solid.watch()
+    assert solid.smallest_jacobian() > 0
+    words = f"turned over at a corner, as at (1, 1) with J = {1 - 2 * moved:.2g}, hold 100.0% of the strain energy"
+    assert (words in str(state.verdict)) == (moved > 0.5)
+
+
+def clamp(kind, n=8):
+    """A square or cube that is slit from x = 1/4 on half way up, and its cells above the slit."""
+    flat = kind in (mesh.CellType.triangle, mesh.CellType.quadrilateral)
+    create, up = (mesh.create_unit_square, 1) if flat else (mesh.create_unit_cube, 2)
+    domain = create(MPI.COMM_WORLD, *(n,) * (up + 1), kind, partitioner=cell_partitioner())
+    slit = mesh.locate_entities(domain, up, lambda x: np.isclose(x[up], 0.5) & (x[0] > 0.25 - 1e-9))
+    state = State(cracked_space(domain, ("Lagrange", 1, (up + 1,)), slit))
+    return state, mesh.locate_entities(domain, up + 1, lambda x: x[up] > 0.5 - 1e-9)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("kind", ["triangle", "quadrilateral", "tetrahedron", "hexahedron"])
+@pytest.mark.parametrize("layers", [-1.0, 0.0, 0.4, 0.8, 1.6])
+def test_jaws_that_close_beyond_each_other(kind, layers):
+    """The upper jaw is sheared down; no node is deeper in the lower one than the end of that is near."""
+    n = 8
+    state, above = clamp(mesh.CellType[kind], n)
+    gdim = state.mesh.geometry.dim
+
+    def down(x):
+        return layers / n * np.maximum(x - 0.25, 0) / 0.625
+
+    state.u.interpolate(lambda x: np.stack([*([0 * x[0]] * (gdim - 1)), -down(x[0])]), above)
+    state.u.x.scatter_forward()
+    SelfIntersection(state).watch()
+    x = np.arange(n + 1) / n
+    depth = n * np.minimum(down(x), 1 - x)
+    words = f"passes through itself by {depth.max():.2g} of an element at ({x[depth.argmax()]:.4g}, "
+    assert words in str(state.verdict) if layers > 0.5 else state.verdict.trusted
+
+
+@pytest.mark.mpi
+def test_a_run_in_which_nothing_keeps_the_jaws_apart():
+    state, _ = clamp(mesh.CellType.quadrilateral)
+    corner = mesh.locate_entities_boundary(state.mesh, 1, lambda x: np.isclose(x[1], 1) & (x[0] > 0.8))
+    bottom = mesh.locate_entities_boundary(state.mesh, 1, lambda x: np.isclose(x[1], 0))
+    supports = [*(Support(state, bottom, i) for i in range(2)), Support(state, corner, 1, lambda t: -0.2 * t)]
+    mechanics = Mechanics(state, [Solid(state, NeoHookean(E, NU))], supports)
+    run(mechanics, 0.2, StepControl.fixed(0.2))
+    assert "surface" not in state.verdict.doubts
+    run(mechanics, 1.0, StepControl.fixed(0.2))
+    assert "surface" in state.verdict.doubts
