@@ -194,10 +194,9 @@ class Solid(Term):
         return sum(part.regularising_work for part in self.contributions)
 
     def watch(self) -> None:
-        """Doubt elements that are folded, or flat and hold a part of the strain energy that counts. Collective."""
+        """Doubt elements that are folded or almost flat, if they hold a part of the energy that counts. Collective."""
         turned = self._volume.turned()
-        if turned is not None:
-            share = turned.energy / integrate(self._energy_form)
+        if turned is not None and not (share := turned.energy / integrate(self._energy_form)) <= CLOSURE:
             self.state.verdict.doubt(
                 f"{self.name}: folded",
                 f"{self.name}: elements that are turned over at a corner, as at {place(turned.place)} with "
