@@ -95,6 +95,23 @@ def test_a_viscosity_that_takes_part_in_what_is_lost():
     assert "viscosity" not in reasons(calm, step=0.05)
 
 
+@pytest.mark.mpi
+@pytest.mark.parametrize("share", [0.01, 0.04])
+def test_contact_that_gives_way(share):
+    """Its penalty and a column of unit height that cannot widen are springs in series."""
+    modulus = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
+    b = make_blocks(n=8)
+    supports = [Support(b.state, b.face(0, side), 0) for side in (0.0, 1.0)]
+    supports += [Support(b.state, b.face(1, 0.0), 1), Support(b.state, b.face(1, 1.0), 1, lambda t: -1e-3 * t)]
+    faces = b.crack(None, contact=PenaltyContact(modulus * (1 / share - 1)))
+    mechanics = Mechanics(b.state, [b.solid(NeoHookean(E, NU)), faces], supports)
+    words = reasons(mechanics, step=0.5)
+    assert mechanics.audit.entries["contact"] / mechanics.audit.scale == pytest.approx(share, rel=0.01)
+    assert words == (
+        "" if share < 0.02 else "contacts hold 4.0% of the work that is done, and give way: firmer ones are needed"
+    )
+
+
 def test_an_element_that_is_almost_flat():
     b = make_blocks(n=2)
     mechanics = moved(b, lambda t: -0.93 * t, contact=PenaltyContact(1e4))

@@ -13,10 +13,13 @@ _BEGUN = 2.0
 _RUBBED = 1e-6
 #: What a viscosity may take of the work that is done, and a brake of what is lost, without a word.
 VISCOUS = 0.01
+#: What the penalties of contacts may hold of the work that is done, without a word: a force is too small by up to twice
+#: as much where a tool is driven apart from the body by them.
+GIVING = 0.02
 
 
 def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, viscous: float) -> None:
-    """Doubt an audit that does not close, and a viscosity that a load has to overcome.
+    """Doubt an audit that does not close, a viscosity that a load has to overcome, and contacts that give way.
 
     Args:
         verdict: The verdict.
@@ -33,6 +36,11 @@ def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, visco
     if viscous > VISCOUS * after.scale:
         # in the first steps it may be much of it: what counts is how much it is in the end
         verdict.suppose("viscosity", f"the viscosity takes {viscous / after.scale:.1%} of the work that is done")
+    verdict.withdraw("contact")
+    held = after.entries["contact"]
+    if held > GIVING * after.scale:
+        words = f"contacts hold {held / after.scale:.1%} of the work that is done, and give way: firmer ones are needed"
+        verdict.suppose("contact", words)
 
 
 def warn_of_jump(carrier: str, entry: str, before: EnergyAudit, after: EnergyAudit, time: float) -> None:
