@@ -79,7 +79,7 @@ def test_an_intact_surface_is_punctured():
     assert rows["deepest"].max() < 0.1 * RULE.size
     assert np.abs(rows["energy_closure"]).max() < 0.01
     assert rows["energy_contact"].max() < 0.05 * rows["energy_strain"].max(), "the guide holds nothing"
-    # viscosity takes what is set free; on this coarse mesh the mouth folds at corners of elements with 3.5 % of the energy
+    # viscosity takes what is set free; on this coarse mesh the mouth folds, in elements with 3.5 % of the energy
     assert set(cut.state.verdict.doubts) <= {"viscosity", "block: folded"}
 
 
