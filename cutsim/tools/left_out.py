@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from dolfinx import la
 from numpy.typing import NDArray
 
 from cutsim.base.terms import Bonded, Term, offering
@@ -21,10 +22,15 @@ def tell_left_out(state: State, terms: Sequence[Term]) -> None:
     facets = np.unique(np.concatenate([crack.interior for crack in cracks])).astype(np.int32)
     both = Face.joined(Face.both(state.mesh, facets[facets < topology.index_map(fdim).size_local]))
     touched = np.concatenate([patch.surface.entities for tool in tools for patch in tool.touched])
-    here = both.cells < topology.index_map(fdim + 1).size_local
+    cells = topology.index_map(fdim + 1)
+    here = both.cells < cells.size_local
     left = np.flatnonzero(here & ~np.isin(_numbers(both.cells, both.local), _numbers(*touched.T)))
+    # whoever owns a cell knows what is touched of it, and tells the ranks that hold it, whose facets belong to the mesh
+    marks = la.vector(cells, dtype=np.int64)
+    np.bitwise_or.at(marks.array, both.cells[left], 1 << both.local[left].astype(np.int64))
+    marks.scatter_forward()
     if state.mesh.comm.allreduce(len(left)):
-        faces = Surface.of(state, both.some(left))
+        faces = Surface.of(state, both.some(np.flatnonzero(marks.array[both.cells] >> both.local & 1)))
         for tool in tools:
             tool.leave_out(faces)
 
