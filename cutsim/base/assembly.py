@@ -37,9 +37,7 @@ def owned_vector(index_map: IndexMap, bs: int) -> PETSc.Vec:
 
 def empty_matrix(forms: Sequence[fem.Form]) -> PETSc.Mat:
     """PETSc matrix with the pattern of the sum of bilinear forms on the same spaces, all zero. Collective."""
-    pattern = sparsity_pattern(forms)
-    pattern.finalize()
-    return create_matrix(petsc_comm(forms[0].mesh.comm), pattern)
+    return create_matrix(petsc_comm(forms[0].mesh.comm), sparsity_pattern(forms))
 
 
 def global_dot(comm: MPI.Comm, a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

@@ -165,11 +165,12 @@ def forms(parts: Sequence[ufl.Form], *, entity_maps: EntityMaps | None = None) -
 
 
 def sparsity_pattern(forms: Sequence[fem.Form]) -> SparsityPattern:
-    """Pattern of the sum of bilinear forms on the same spaces, not finalised."""
+    """Pattern of the sum of bilinear forms on the same spaces. Collective."""
     first, *further = forms
     pattern = fem.create_sparsity_pattern(first)
     for other in further:
         fem.build_sparsity_pattern(pattern, other)
+    pattern.finalize()
     return pattern
 
 

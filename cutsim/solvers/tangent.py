@@ -48,9 +48,7 @@ class Tangent:
         self._directions = directions or Directions(V)
         self.drag: NDArray[np.float64] | None = None
         if V.mesh.comm.size == 1:
-            pattern = compat.sparsity_pattern(self._a)
-            pattern.finalize()
-            self._csr = la.matrix_csr(pattern, block_mode=la.BlockMode.expanded)
+            self._csr = la.matrix_csr(compat.sparsity_pattern(self._a), block_mode=la.BlockMode.expanded)
             n = len(self._csr.indptr) - 1
             arrays = self._csr.indptr.astype(PETSc.IntType), self._csr.indices, self._csr.data
             self._forms = PETSc.Mat().createAIJWithArrays((n, n), arrays, comm=petsc_comm(V.mesh.comm))
