@@ -77,10 +77,6 @@ with Recording("results/blade", cut.mechanics, until, title="blade", **options) 
 # `results/blade` now has the history of the run and files for ParaView.  The toughness is found again from the work
 # that neither the body nor friction nor viscosity has taken, divided by the area cut; this checks the energy audit.
 # The force of the blade and that of the plate balance each other.
-#
-# The verdict of the run is *questionable*: the contact of the blade is soft.  A steady cut does not feel that, but here
-# it holds 9 % of the work, and the force is a quarter too small at 2 mm.  `cracked_block(…, faces=Faces(firm=True))`
-# cures this, with five times as many iterations.
 
 from cutsim import Curve, draw_insertion, plot_curves, plot_energy
 from cutsim.studies.insertion_work import audited_toughness

@@ -90,7 +90,7 @@ def test_stiffness_of_the_machine_shifts_the_curve():
 def test_blade_under_a_force_rests_where_the_curve_has_that_force():
     """It is held until the push begins; then the force grows slowly from what the notch bears, and stays."""
     before = rows_of(pushed(), ENTRY, 0.08)["force"][-1]
-    load, ramp = 0.05, 0.3
+    load, ramp = 0.06, 0.3
 
     def force(t):
         return before + (load - before) * min(max(t - ENTRY, 0.0) / ramp, 1.0)

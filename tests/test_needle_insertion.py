@@ -104,9 +104,8 @@ def test_the_steady_force_is_that_of_the_thread_and_of_the_hole():
     assert strain == pytest.approx(widened, rel=0.02)
     assert fracture == pytest.approx(torn, rel=0.05)
     assert work == pytest.approx(torn + widened + contact, rel=0.05)
-    assert contact < 0.02 * work
-    # the thread lies in the needle that destroys it
-    assert not any("unresisted" in reason for reason in cut.state.verdict.reasons)
+    # its contact hardly gives way, and the thread lies in the needle that destroys it
+    assert not any("give way" in reason or "unresisted" in reason for reason in cut.state.verdict.reasons)
 
 
 @pytest.mark.parametrize("friction", [0.0, FRICTION])
@@ -128,7 +127,11 @@ def test_the_parts_of_the_force_are_those_of_the_audit():
     late = parts["depth"] > 0.9
     np.testing.assert_allclose(sum(parts[n] for n in names)[late], parts["force"][late], rtol=0.01)
     assert np.diff(parts["shaft friction"][late]).min() > 0, "more and more of the shaft is in the body"
-    np.testing.assert_allclose(parts["cutting"][-2:], 2 * np.pi * THREAD * TOUGHNESS, rtol=0.05)
+    # steady from there on; the body is drawn out by the tool, and more than the way is cut
+    last, swept = history["depth"].max() - 0.4, history["front"][: np.argmax(history["depth"]) + 1]
+    swept = swept[-1] - np.interp(last, history["depth"][: len(swept)], swept)
+    assert 2 * np.pi * THREAD < swept / 0.4 < 1.1 * 2 * np.pi * THREAD
+    assert parts["cutting"][-2:].mean() == pytest.approx(TOUGHNESS * swept / 0.4, rel=0.02)
     assert not parts["shaft friction"][parts["depth"] < 0.6].any(), "the shaft begins higher up"
     for rounding in (-1e-15, 1e-15):  # of the last depth, which the second push reaches again
         twice = history | {"depth": np.append(history["depth"][:-1], history["depth"].max() + rounding)}

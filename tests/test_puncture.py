@@ -92,7 +92,7 @@ def test_a_tool_in_a_notch_is_as_firm_as_on_an_intact_surface_where_faces_are():
     size = firm.body.cracks[0].normal_size
     for contact in firm.contacts:
         assert contact.contact == BLADE.firm_contact(SOLID.young, size)
-    assert soft.contacts[0].contact == BLADE.contact(SOLID.young, size)
+    assert soft.contacts[0].contact == BLADE.soft_contact(SOLID.young, size)
 
 
 def test_faces_of_a_thread_are_not_alike():

@@ -16,7 +16,7 @@ from cutsim.base.verdict import Verdict
 from cutsim.bodies.loads import Support
 from cutsim.fields.points import Surface
 from cutsim.interface.cohesive import Exponential
-from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.contact import PenaltyContact, SoftenedContact
 from cutsim.materials.elastic import NeoHookean
 from cutsim.results.output import claim_folder, read_history
 from cutsim.results.recording import Recording
@@ -110,6 +110,26 @@ def test_contact_that_gives_way(share):
     assert words == (
         "" if share < 0.02 else "contacts hold 4.0% of the work that is done, and give way: firmer ones are needed"
     )
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(("clearance", "words"), [(0.0, "contacts hold 4.0% of the work"), (3e-5, "")])
+def test_a_tool_with_a_clearance_gives_way_less(clearance, words):
+    """The springs in series again: the tool is ahead of the surface by p/ε less the clearance."""
+    modulus, travel, share = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU)), 1e-3, 0.04
+    b = make_blocks(n=8)
+    supports = [Support(b.state, b.face(0, side), 0) for side in (0.0, 1.0)] + [Support(b.state, b.face(1, 0.0), 1)]
+    start = 1.0 + clearance - 1e-6  # pressed a little, to be held
+    path = ToolPath.polyline([0, 1], [(0.5, start), (0.5, 1.0 - travel)])
+    law = SoftenedContact(modulus * (1 / share - 1), 0.0, clearance)
+    tool = ToolContact(b.state, Plane((0.0, -1.0)), path, [Surface.exterior(b.state, b.face(1, 1.0))], contact=law)
+    body = [b.solid(NeoHookean(E, NU)), b.crack(None, contact=PenaltyContact(1e5 * modulus))]
+    mechanics = Mechanics(b.state, [*body, tool], supports)
+    assert reasons(mechanics, step=0.5).startswith(words) and bool(words) != mechanics.state.verdict.trusted
+    pressure = (1 - share) * modulus * (travel + clearance)
+    held = mechanics.audit.entries["contact"] - tool.cushion
+    assert held == pytest.approx(0.5 * pressure * (pressure / law.stiffness - clearance), rel=0.02)
+    assert 2 * held / mechanics.audit.scale == pytest.approx(2 * (share - clearance / (travel + clearance)), rel=0.02)
 
 
 def test_an_element_that_is_almost_flat():

@@ -18,7 +18,7 @@ VISCOUS = 0.01
 GIVING = 0.02
 
 
-def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, viscous: float) -> None:
+def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, viscous: float, cushion: float) -> None:
     """Doubt an audit that does not close, a viscosity that a load has to overcome, and contacts that give way.
 
     Args:
@@ -27,6 +27,8 @@ def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, visco
         after: ... and at its end.
         viscous: Work so far against what may only help the solver. What a body sets free when a crack runs by itself
             is not counted: some viscosity has to take it, and however small it is it takes as much [energy].
+        cushion: What contacts hold at the end though surfaces do not give way by it: their pressure begins before they
+            touch [energy].
     """
     verdict.withdraw("closure")
     if after.worst_closure > CLOSURE:
@@ -37,7 +39,7 @@ def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, visco
         # in the first steps it may be much of it: what counts is how much it is in the end
         verdict.suppose("viscosity", f"the viscosity takes {viscous / after.scale:.1%} of the work that is done")
     verdict.withdraw("contact")
-    held = after.entries["contact"]
+    held = after.entries["contact"] - cushion
     if held > GIVING * after.scale:
         words = f"contacts hold {held / after.scale:.1%} of the work that is done, and give way: firmer ones are needed"
         verdict.suppose("contact", words)

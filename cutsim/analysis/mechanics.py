@@ -26,6 +26,7 @@ from cutsim.base.terms import (
     Body,
     Bonded,
     Columns,
+    Cushioned,
     Damaging,
     Energetic,
     Interface,
@@ -242,7 +243,8 @@ class Mechanics(Balance[Term, Support]):
         free = max(self.audit.stored - self.trial_audit.stored, 0.0)
         before, resisted = self._resisted.committed
         self._resisted.trial = (viscous, resisted + max(viscous - before - free, 0.0))
-        doubt_audit(self.state.verdict, self.audit, self.trial_audit, self._resisted.trial[1])
+        cushion = sum((t.cushion for t in offering(self.terms, Cushioned)), start=0.0)
+        doubt_audit(self.state.verdict, self.audit, self.trial_audit, self._resisted.trial[1], cushion)
         for carrier in self.carriers:
             warn_of_jump(carrier.name, carrier.entry, self.audit, self.trial_audit, self.state.time)
         doubt_way_back(self.state, self.audit, self.trial_audit)

@@ -283,6 +283,15 @@ class Regularised(Protocol):
 
 
 @runtime_checkable
+class Cushioned(Protocol):
+    """A term with a contact that may begin before its surfaces touch."""
+
+    @property
+    def cushion(self) -> float:
+        """Energy that it holds in the trial state beyond half the work of its pressure on the penetration [energy]."""
+
+
+@runtime_checkable
 class Interface(Protocol):
     """A term that joins the two faces of a crack or of a pair of surfaces.
 

@@ -133,7 +133,7 @@ def _contact(shape: object, solids: tuple[Solid, ...], surfaces: list[Surface]) 
     points = [surface.points for surface in surfaces]
     young = min(softest(solids, p.facets) for p in points)
     h = min(p.mean(normal_size(solids[0].state.mesh, p.facets)) for p in points)
-    return shape.contact(young, h) if isinstance(shape, Insertable) else PenaltyContact.automatic(young, h)
+    return shape.soft_contact(young, h) if isinstance(shape, Insertable) else PenaltyContact.automatic(young, h)
 
 
 def path_of(table: schema.Moved) -> ToolPath:

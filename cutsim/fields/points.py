@@ -223,15 +223,17 @@ class Surface:
 
     @classmethod
     @checked
-    def exterior(cls, state: State, facets: NDArray[np.int32]) -> "Surface":
-        """A part of the outer boundary, given by its local facets. Collective."""
-        return cls(FacetPoints(state.mesh, facets, state.measures.exterior(facets), interior=False))
+    def exterior(cls, state: State, facets: NDArray[np.int32], degree: int = DEGREE) -> "Surface":
+        """A part of the outer boundary, given by its local facets, with a quadrature of some degree. Collective."""
+        measure = state.measures.exterior(facets)
+        return cls(FacetPoints(state.mesh, facets, measure, interior=False, degree=degree))
 
     @classmethod
     @checked
-    def of(cls, state: State, face: Face) -> "Surface":
-        """The surface of facets that are seen from one of their cells. Collective."""
-        return cls(FacetPoints(state.mesh, face.facets, state.measures.face(face), interior=False))
+    def of(cls, state: State, face: Face, degree: int = DEGREE) -> "Surface":
+        """The surface of facets that are seen from one of their cells, with a quadrature of some degree. Collective."""
+        measure = state.measures.face(face)
+        return cls(FacetPoints(state.mesh, face.facets, measure, interior=False, degree=degree))
 
     @property
     def measure(self) -> ufl.Measure:

@@ -1,6 +1,7 @@
 """Contact laws: the normal pressure for a penetration (docs/theory.md §3, 4)."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import ufl
@@ -31,6 +32,7 @@ class PenaltyContact:
 
     stiffness: Stiffness
     blend: Length = 0.0
+    clearance: ClassVar[Length] = 0.0
 
     def __post_init__(self) -> None:
         require_number("stiffness", self.stiffness, positive)
@@ -69,3 +71,39 @@ class PenaltyContact:
         quadratic = self.stiffness * s**3 / (12 * c)
         linear = self.stiffness * (0.5 * (s - c) ** 2 + c**2 / 6)
         return ufl.conditional(ufl.lt(s, 0), 0.0, ufl.conditional(ufl.lt(s, 2 * c), quadratic, linear))
+
+
+@checked
+@dataclass(frozen=True)
+class SoftenedContact(PenaltyContact):
+    """Penalty contact that begins before the surfaces touch, at a clearance, so that it gives way less on the whole.
+
+    The pressure at a penetration δ is that of the penalty contact at δ + clearance.  Commercial codes call this a
+    softened contact.  It is for a rigid tool that would feel as if it were thinner.
+
+    Args:
+        stiffness: Penalty ε_N > 0 [stress/length].
+        blend: Half the width of the quadratic start, c ≥ 0 [length].
+        clearance: Distance of the surfaces at which the pressure begins, ≥ 0 [length].
+
+    Raises:
+        ValueError: A value is outside its range.
+    """
+
+    clearance: Length = 0.0  # type: ignore[misc]  # of each law its own
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_number("clearance", self.clearance, nonnegative)
+
+    def pressure(self, penetration: Expr) -> Expr:
+        """Contact pressure p ≥ 0 [stress] at a penetration (positive inside) [length]."""
+        return super().pressure(penetration + self.clearance)
+
+    def penetration(self, pressure: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Least penetration with a pressure ≥ 0, the inverse of `pressure` [length]."""
+        return super().penetration(pressure) - self.clearance
+
+    def energy(self, penetration: Expr) -> Expr:
+        """Energy ∫ p dδ stored since the pressure began [force/length]."""
+        return super().energy(penetration + self.clearance)

@@ -46,7 +46,7 @@ class ContactMultiplier:
         old, mean = self._points.get(self._shift), self._points.facet_mean
         whole = (pressure > 0).all(axis=1)
         new = np.where(whole, old[:, 0] + mean(penetration), self._contact.penetration(mean(pressure)))
-        shift = np.broadcast_to(np.maximum(new, 0.0)[:, None], old.shape)
+        shift = np.broadcast_to(np.maximum(new, -self._contact.clearance)[:, None], old.shape)
         if self._points.maximum(np.abs(shift - old)) <= self._allowed:
             return False
         self._points.set(self._shift, shift)

@@ -31,6 +31,8 @@ from cutsim.tools.tool_contact import ToolContact, doubt_units
 from cutsim.tools.tool_parts import PARTS, ToolParts
 
 _WIDEST = 1.0472  # π/3 and a little
+# of the quadrature of the contact: the edge of the tool may be as small as a facet, and would catch on fewer points
+_DEGREE = 8
 #: Name of a half of the tool by its side.
 _SIDES = {1: "right", -1: "left"}
 
@@ -226,7 +228,7 @@ def _contacts(
     for face, side, group in faces:
         half = tool if whole else replace(tool, side=side)  # type: ignore[type-var]
         for crack in body.cracks:
-            soft = half.contact(crack.young, crack.normal_size)
+            soft = half.soft_contact(crack.young, crack.normal_size)
             name = "_".join([_kind(tool), _SIDES[side], *([crack.name] if len(body.cracks) > 1 else [])])
             contact = ToolContact(
                 body.state,
@@ -248,7 +250,8 @@ def _contacts(
 
 def _surfaces(body: CrackedBody, crack: Crack, face: Literal["+", "-"], top: str) -> list[Surface]:
     """Face of a part of the crack; with the first one that of the notch, and the surface beside it."""
+    cut = Surface.of(body.state, crack.face(face), _DEGREE)
     if crack is not body.cracks[0]:
-        return [crack.surface(face)]
-    surfaces = [Surface.exterior(body.state, body.domain.facets(top)), crack.surface(face)]
-    return surfaces + ([] if body.notch is None else [body.notch.surface(face)])
+        return [cut]
+    surfaces = [Surface.exterior(body.state, body.domain.facets(top), _DEGREE), cut]
+    return surfaces + ([] if body.notch is None else [Surface.of(body.state, body.notch.face(face), _DEGREE)])

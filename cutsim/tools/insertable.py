@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from cutsim.base.kinematics import Expr
-from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.contact import PenaltyContact, SoftenedContact
 from cutsim.tools.shapes import Direction
 
 # penalty over E/h and half the width of the quadratic start over h, for an intact surface
@@ -24,8 +24,8 @@ class Insertable(ABC):
         mirrored: Whether it is symmetric about the plane of its axis and of the normal of the crack.
         halving: How its direction `lateral` has to lie to the crack, in words.
         angle: Name of its angle between axis and flank.
-        firmness: Penalty of its contact with a soft solid, times mesh size over Young's modulus, and half the width of
-            the quadratic start over the radius of the tip; as `contact` takes them.
+        firmness: Of its contact in a cut: penalty times h/E, half the width of the quadratic start over h, and the
+            clearance over h.
     """
 
     push: Direction
@@ -36,8 +36,7 @@ class Insertable(ABC):
     mirrored: ClassVar[bool] = True
     halving: ClassVar[str] = "normal to the crack"
     angle: ClassVar[str] = "half_angle"
-    # measured: stiff enough for the force, soft enough for Newton's method
-    firmness: ClassVar[tuple[float, float]]
+    firmness: ClassVar[tuple[float, float, float]]
 
     @property
     @abstractmethod
@@ -67,15 +66,15 @@ class Insertable(ABC):
     def distance(self, x: Expr) -> Expr:
         """Signed distance at a position relative to the reference point [length], negative inside."""
 
-    def contact(self, young: float, h: float) -> PenaltyContact:
-        """Contact law of the tool in a soft solid, as soft as the force allows.
+    def soft_contact(self, young: float, h: float) -> SoftenedContact:
+        """Contact law of the tool in a cut, so soft that its tip does not catch on the nodes.
 
         Args:
             young: Young's modulus of the solid [stress].
             h: Size of its cells normal to the surface [length].
         """
-        factor, blend = self.firmness
-        return PenaltyContact.automatic(young, h, factor, blend=blend * self.resolution)
+        penalty, blend, clearance = self.firmness
+        return SoftenedContact(penalty * young / h, blend * h, clearance * h)
 
     @staticmethod
     def firm_contact(young: float, h: float) -> PenaltyContact:

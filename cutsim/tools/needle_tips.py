@@ -90,7 +90,7 @@ class BevelNeedle(Insertable):
     mirrored: ClassVar[bool] = False
     halving: ClassVar[str] = "in the plane of the crack"
     angle: ClassVar[str] = "bevel_angle"
-    firmness: ClassVar[tuple[float, float]] = (20.0, 0.1)  # as those of other needles
+    firmness: ClassVar[tuple[float, float, float]] = (20.0, 0.2, 0.2)  # as that of other needles
 
     bevel_angle: Angle
     radius: Length

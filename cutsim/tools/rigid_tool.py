@@ -174,7 +174,7 @@ class RigidTool(Term, ABC):
     def watch(self) -> None:
         """Doubt a tool that has not touched the body yet, or that lies deep in it. Collective."""
         depth = self.penetration()
-        if depth > 0:
+        if self.force().any():
             self.state.verdict.withdraw(self._untouched)
         doubt_penetration(self.state.verdict, self.name, depth, self.blend)
 

@@ -100,7 +100,7 @@ class Patch:
             rubbing = Rubbing(
                 self.place,  # it changes by the slip relative to the tool, which moves and turns
                 self._pressure,
-                held,
+                held + self._contact.clearance,
                 project=lambda slip: tangential(slip, normal),
                 temperature=None if body is None else hotter(body.value, temperature),
             )
@@ -302,6 +302,12 @@ class ToolContact(RigidTool):
     def penetration(self) -> float:
         """Largest depth of a point of the body in the tool over the mesh size, ≤ 0 if none is in it. Collective."""
         return max(p.penetration() for p in self.patches)
+
+    @property
+    def cushion(self) -> float:
+        """Energy of the penalties beyond half the work of the pressure on the penetration, < 0 for a blend alone."""
+        seen = [(p.surface.points, p.contact()) for p in self.patches]
+        return integrate(self._energy_form) - 0.5 * sum(at.integral(now["pressure"] * now["depth"]) for at, now in seen)
 
     def leave_out(self, faces: Surface) -> None:
         """Note faces of cracks that no tool can touch, to look whether they come into this one. Collective."""
