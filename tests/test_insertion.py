@@ -171,6 +171,17 @@ def test_faces_that_slide_are_a_pair():
         Faces(sliding=True, firm=True)
 
 
+def test_all_surfaces_may_meet():
+    """The outer surface, too, which does not come to lie on itself here: again the same cut."""
+    (_, plain), (cut, met) = split(), split(faces=Faces(automatic=True))
+    np.testing.assert_allclose(met["force"][-1], plain["force"][-1], rtol=0.01)
+    whole = sum(len(face.facets) for face in cut.body.pairs[0].sides)
+    assert whole > len(cut.body.slit) * 2 and np.abs(met["energy_closure"]).max() < 0.01
+    for option in ("sliding", "symmetric", "firm"):
+        with pytest.raises(ValueError, match="automatic"):
+            Faces(automatic=True, **{option: True})
+
+
 def test_a_body_without_a_notch_is_entered_at_its_surface():
     """The tool comes from above, dents the body, and then opens the crack; the plate carries its force."""
     cut, rows = split(notch=0.0)

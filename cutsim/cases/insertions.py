@@ -85,7 +85,7 @@ def _cracked(domain: Domain) -> tuple[CrackedBody, Temperature | None]:
         faces = tables.insertion.faces
         cracks = (faces.crack(state, bonded, plus, tables.law, young=softest(bodies, bonded)),)
         cut = [faces.crack(state, f, plus, None, young=softest(bodies, f), name="notch") for f in broken]
-        guides, pairs, slit = faces.guides(cracks), faces.pairs([*cut, *cracks]), cut[0] if cut else None
+        guides, pairs, slit = faces.guides(cracks), faces.pairs([*cut, *cracks], bodies), cut[0] if cut else None
     made: dict[str, Any] = {"guides": guides, "pairs": pairs, "faces": faces}
     return CrackedBody(domain.tagged, state, bodies, cracks, slit, **made), value
 

@@ -21,6 +21,7 @@ from cutsim.interface.crack import Crack
 from cutsim.interface.guide import Guide
 from cutsim.interface.rubbing import AnyFriction, check_friction
 from cutsim.materials.elastic import Material
+from cutsim.pairs.contact_surfaces import ContactSurfaces
 from cutsim.pairs.surface_pair import SurfacePair
 from cutsim.results.recording import Columns
 
@@ -45,6 +46,8 @@ class Faces:
         symmetric: Whether body and tool are alike on both sides of a plane crack.
         sliding: Whether the faces slide over each other by more than a facet, as at the rim of a notch into which a
             tool with much friction is pushed. They then look for each other anew, at a higher cost.
+        automatic: Whether all surfaces of the body may meet, in place of the two faces: where a rough tool draws the rim
+            of a notch in so far that it folds, the outer surface comes to lie on itself and on the faces.
         firm: Whether tool and faces penetrate each other as little as under a tip that indents an intact surface, and
             the faces part along the normal that they had: for an edge that goes round a body of revolution, and for a
             cut from a notch that is compared with a puncture. Faces that are alike are firm in any case.
@@ -52,11 +55,13 @@ class Faces:
             where the bond is broken.
 
     Raises:
-        ValueError: The coefficient is negative, or faces that are alike on both sides are to slide.
+        ValueError: The coefficient is negative, faces that are alike on both sides are to slide, or two things are
+            named of which one includes the other.
     """
 
     symmetric: bool = False
     sliding: bool = False
+    automatic: bool = False
     firm: bool = False
     friction: AnyFriction = None
 
@@ -64,6 +69,8 @@ class Faces:
         check_friction("friction", self.friction)
         firm = self.symmetric or self.firm
         require("sliding", self.sliding, not (self.sliding and firm), "False where both sides are alike or firm")
+        other = self.automatic and (firm or self.sliding)
+        require("automatic", self.automatic, not other, "False where faces are alike, firm or slide")
 
     def crack(
         self,
@@ -76,8 +83,8 @@ class Faces:
         name: str = "crack",
     ) -> Crack:
         """A crack with such faces; arguments as for `Crack`. Collective."""
-        options: dict[str, Any] = {"young": young, "name": name, "closing": not self.sliding}
-        if not self.sliding:
+        options: dict[str, Any] = {"young": young, "name": name, "closing": not self._paired}
+        if not self._paired:
             options["friction"] = self.friction
         if self.symmetric:
             require("faces.symmetric", True, not state.axisymmetric, "False in a body of revolution")
@@ -91,8 +98,14 @@ class Faces:
         """What keeps the middle of some cracks in their plane."""
         return tuple(Guide(crack) for crack in cracks) if self.symmetric else ()
 
-    def pairs(self, cracks: Sequence[Crack]) -> tuple[SurfacePair, ...]:
+    @property
+    def _paired(self) -> bool:
+        return self.sliding or self.automatic
+
+    def pairs(self, cracks: Sequence[Crack], solids: Sequence[Solid]) -> tuple[SurfacePair, ...]:
         """What lets the faces of cracks that follow each other slide, those of one side as one surface. Collective."""
+        if self.automatic:
+            return (ContactSurfaces.automatic(solids).pair(friction=self.friction, name="faces"),)
         if not self.sliding:
             return ()
         plus, minus = ([crack.face(side) for crack in cracks] for side in _SIDES)
@@ -192,16 +205,17 @@ def cracked_block(
     broken = domain.facets(notch) if notch in domain.names else None
     state = cracked_state(domain, [bonded] if broken is None else [bonded, broken], degree, axisymmetric)
     young = material.young
+    block = Solid(state, material, name="block", viscosity=viscosity, **(solid or {}))
     cut = (faces.crack(state, bonded, plus, law, young=young),)
     open_ = [] if broken is None else [faces.crack(state, broken, plus, None, young=young, name="notch")]
     return CrackedBody(
         domain,
         state,
-        (Solid(state, material, name="block", viscosity=viscosity, **(solid or {})),),
+        (block,),
         cut,
         open_[0] if open_ else None,
         guides=faces.guides(cut),
-        pairs=faces.pairs([*open_, *cut]),
+        pairs=faces.pairs([*open_, *cut], (block,)),
         faces=faces,
     )
 

@@ -128,7 +128,7 @@ class LayeredBlock(CrackedBody):
         )
         through = [layer for layer in layers if layer not in parts[0][1:] and all(layer not in p for p in parts[1:])]
         notch = [faces.crack(state, where, towards, None, young=_softest(through), name="notch") for where in broken]
-        guides, pairs = faces.guides(cracks), faces.pairs([*notch, *cracks])
+        guides, pairs = faces.guides(cracks), faces.pairs([*notch, *cracks], solids)
         cut = notch[0] if notch else None
         return cls(domain, state, solids, cracks, cut, tuple(layers), guides=guides, pairs=pairs, faces=faces)
 
