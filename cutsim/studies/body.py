@@ -103,7 +103,12 @@ class Faces:
         return self.sliding or self.automatic
 
     def pairs(self, cracks: Sequence[Crack], solids: Sequence[Solid]) -> tuple[SurfacePair, ...]:
-        """What lets the faces of cracks that follow each other slide, those of one side as one surface. Collective."""
+        """What lets the faces of cracks that follow each other slide, those of one side as one surface. Collective.
+
+        Args:
+            cracks: The cracks.
+            solids: The bodies, of which all surfaces may meet if the faces are `automatic`.
+        """
         if self.automatic:
             return (ContactSurfaces.automatic(solids).pair(friction=self.friction, name="faces"),)
         if not self.sliding:
