@@ -12,6 +12,7 @@ from dolfinx.mesh import Mesh
 from mpi4py import MPI
 from numpy.typing import NDArray
 
+from cutsim.base.checks import count, require_number
 from cutsim.base.compat import EntityMaps, create_submesh, form
 from cutsim.base.kinematics import Expr
 from cutsim.base.places import Places, corners, facet_order
@@ -224,14 +225,24 @@ class Surface:
     @classmethod
     @checked
     def exterior(cls, state: State, facets: NDArray[np.int32], degree: int = DEGREE) -> "Surface":
-        """A part of the outer boundary, given by its local facets, with a quadrature of some degree. Collective."""
+        """A part of the outer boundary, given by its local facets, with a quadrature of some degree. Collective.
+
+        Raises:
+            ValueError: The degree is no positive integer.
+        """
+        require_number("degree", degree, count(1))
         measure = state.measures.exterior(facets)
         return cls(FacetPoints(state.mesh, facets, measure, interior=False, degree=degree))
 
     @classmethod
     @checked
     def of(cls, state: State, face: Face, degree: int = DEGREE) -> "Surface":
-        """The surface of facets that are seen from one of their cells, with a quadrature of some degree. Collective."""
+        """The surface of facets that are seen from one of their cells, with a quadrature of some degree. Collective.
+
+        Raises:
+            ValueError: The degree is no positive integer.
+        """
+        require_number("degree", degree, count(1))
         measure = state.measures.face(face)
         return cls(FacetPoints(state.mesh, face.facets, measure, interior=False, degree=degree))
 
