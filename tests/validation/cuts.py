@@ -65,7 +65,7 @@ def angles(quick: bool) -> dict[str, float]:
     found, unknowns = {}, 0
     for angle in (10, 30) if quick else (10, 15, 20, 30):
         for toughness in (0.1,) if quick else (0.05, 0.1, 0.2):
-            for size in (0.1,) if quick else (0.1, 0.05):
+            for size in (0.05,) if quick else (0.1, 0.05):
                 value, unknowns = split(angle, toughness, size)
                 found[f"{angle}°, {toughness} N/mm, {size} mm"] = value / toughness
     return found | {"unknowns": unknowns}
