@@ -14,7 +14,7 @@ from cutsim.base.checks import above, nonnegative, require, require_number
 from cutsim.base.signatures import checked
 from cutsim.bodies.loads import Support
 from cutsim.bodies.machine import Machine
-from cutsim.fields.points import Surface
+from cutsim.fields.points import DEGREE, Surface
 from cutsim.fields.state import State
 from cutsim.interface.crack import Crack
 from cutsim.interface.rubbing import AnyFriction, check_friction, completed
@@ -31,7 +31,8 @@ from cutsim.tools.tool_contact import ToolContact, doubt_units
 from cutsim.tools.tool_parts import PARTS, ToolParts
 
 _WIDEST = 1.0472  # π/3 and a little
-# of the quadrature of the contact: the edge of the tool may be as small as a facet, and would catch on fewer points
+# of the quadrature of a contact that is not firm: the edge of the tool may be as small as a facet, and would catch on
+# fewer points; a firm contact would need twice the time for it
 _DEGREE = 8
 #: Name of a half of the tool by its side.
 _SIDES = {1: "right", -1: "left"}
@@ -234,7 +235,7 @@ def _contacts(
                 body.state,
                 half,
                 motion.path(frame, half),
-                _surfaces(body, crack, face, group),
+                _surfaces(body, crack, face, group, DEGREE if firm else _DEGREE),
                 contact=half.firm_contact(crack.young, crack.normal_size) if firm else soft,
                 friction=completed(friction, soft.stiffness),
                 name=name,
@@ -248,10 +249,10 @@ def _contacts(
     return tuple(found)
 
 
-def _surfaces(body: CrackedBody, crack: Crack, face: Literal["+", "-"], top: str) -> list[Surface]:
+def _surfaces(body: CrackedBody, crack: Crack, face: Literal["+", "-"], top: str, degree: int) -> list[Surface]:
     """Face of a part of the crack; with the first one that of the notch, and the surface beside it."""
-    cut = Surface.of(body.state, crack.face(face), _DEGREE)
+    cut = Surface.of(body.state, crack.face(face), degree)
     if crack is not body.cracks[0]:
         return [cut]
-    surfaces = [Surface.exterior(body.state, body.domain.facets(top), _DEGREE), cut]
-    return surfaces + ([] if body.notch is None else [Surface.of(body.state, body.notch.face(face), _DEGREE)])
+    surfaces = [Surface.exterior(body.state, body.domain.facets(top), degree), cut]
+    return surfaces + ([] if body.notch is None else [Surface.of(body.state, body.notch.face(face), degree)])
