@@ -60,6 +60,7 @@ class FacetPoints:
         degree: int = DEGREE,
         ordered: bool = False,
     ) -> None:
+        require_number("degree", degree, count(1))
         fdim = mesh.topology.dim - 1
         # that of the submesh, which dies with the points, would do: but mpi4py keeps a lock with each communicator that
         # Python objects went through, and freeing it while an exception is under way blocks all that come after
@@ -230,7 +231,6 @@ class Surface:
         Raises:
             ValueError: The degree is no positive integer.
         """
-        require_number("degree", degree, count(1))
         measure = state.measures.exterior(facets)
         return cls(FacetPoints(state.mesh, facets, measure, interior=False, degree=degree))
 
@@ -242,7 +242,6 @@ class Surface:
         Raises:
             ValueError: The degree is no positive integer.
         """
-        require_number("degree", degree, count(1))
         measure = state.measures.face(face)
         return cls(FacetPoints(state.mesh, face.facets, measure, interior=False, degree=degree))
 
