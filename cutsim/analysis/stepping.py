@@ -294,8 +294,8 @@ def _pace_carried(problem: Problem, control: Control, report: StepReport, size: 
 def _accept(problem: Problem, report: StepReport, pace: Pace) -> StepReport:
     """Commit a step."""
     state = problem.state
-    problem.watch()
     state.pace.trial = pace
+    problem.watch()
     state.commit()
     return replace(report, columns=problem.record())
 

@@ -194,7 +194,12 @@ class Solid(Term):
         return sum(part.regularising_work for part in self.contributions)
 
     def watch(self) -> None:
-        """Doubt elements that are folded or almost flat, if they hold a part of the energy that counts. Collective."""
+        """Doubt elements that are folded or almost flat, if they hold a part of the energy that counts. Collective.
+
+        What a jump does to them on the way does not count, if they are whole again when the body rests.
+        """
+        if self.state.jumping:
+            return
         turned = self._volume.turned()
         if turned is not None and not (share := turned.energy / integrate(self._energy_form)) <= CLOSURE:
             self.state.verdict.doubt(

@@ -123,6 +123,11 @@ class State:
         return self._clock.trial.time + 2 * self._clock.trial.back
 
     @property
+    def jumping(self) -> bool:
+        """Whether the trial step is one across a jump, after which the body does not yet rest."""
+        return bool(self.pace.trial.carrier)
+
+    @property
     def number(self) -> int:
         """Number of the step (trial)."""
         return self._clock.trial.number

@@ -79,9 +79,12 @@ class SelfIntersection:
         self._state = state
 
     def watch(self) -> None:
-        """Doubt a surface that has passed through itself by a part of an element. Collective."""
+        """Doubt a surface that has passed through itself by a part of an element. Collective.
+
+        One that does so only while the body jumps is none that the state at rest knows of.
+        """
         mesh, degree = self._state.mesh, self._state.V.ufl_element().degree
-        if not 1 < mesh.topology.dim == mesh.geometry.dim or degree > 2:
+        if self._state.jumping or not 1 < mesh.topology.dim == mesh.geometry.dim or degree > 2:
             return
         depth, where = min(mesh.comm.allgather(self._deepest()))
         if -depth > DEEP:

@@ -224,12 +224,12 @@ def _contacts(
     if not whole:  # else the thread does not meet the tool
         faces.append(("-", -plus, top[0]))
     intact = body.notch is None and body.state.axisymmetric
-    firm = body.faces.symmetric or body.faces.firm or intact
+    firm = body.faces.firm or intact
     found = []
     for face, side, group in faces:
         half = tool if whole else replace(tool, side=side)  # type: ignore[type-var]
         for crack in body.cracks:
-            soft = half.soft_contact(crack.young, crack.normal_size)
+            soft = half.soft_contact(crack.young, crack.normal_size, indenting=body.faces.symmetric)
             name = "_".join([_kind(tool), _SIDES[side], *([crack.name] if len(body.cracks) > 1 else [])])
             contact = ToolContact(
                 body.state,

@@ -9,6 +9,8 @@ from cutsim.tools.shapes import Direction
 
 # penalty over E/h and half the width of the quadratic start over h, for an intact surface
 _FIRM, _BLEND = 1000.0, 0.1
+# how much stiffer than in a cut the contact is of a tool that may also indent: it presses with several times E
+_INDENTING = 4.0
 
 
 class Insertable(ABC):
@@ -66,15 +68,18 @@ class Insertable(ABC):
     def distance(self, x: Expr) -> Expr:
         """Signed distance at a position relative to the reference point [length], negative inside."""
 
-    def soft_contact(self, young: float, h: float) -> SoftenedContact:
+    def soft_contact(self, young: float, h: float, *, indenting: bool = False) -> SoftenedContact:
         """Contact law of the tool in a cut, so soft that its tip does not catch on the nodes.
 
         Args:
             young: Young's modulus of the solid [stress].
             h: Size of its cells normal to the surface [length].
+            indenting: Whether it may also indent the solid, with several times Young's modulus; it is then four
+                times as stiff.
         """
         penalty, blend, clearance = self.firmness
-        return SoftenedContact(penalty * young / h, blend * h, clearance * h)
+        factor = _INDENTING if indenting else 1.0
+        return SoftenedContact(factor * penalty * young / h, blend * h, clearance * h)
 
     @staticmethod
     def firm_contact(young: float, h: float) -> PenaltyContact:
