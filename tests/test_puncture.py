@@ -1,5 +1,7 @@
 """Puncture of an intact surface: the guide of a plane cut, the event itself, and a body that is cut through."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -28,6 +30,8 @@ COMM = MPI.COMM_WORLD
 SOLID, BOND = NeoHookean(0.777, 0.45), Exponential(strength=0.3, toughness=0.1)
 BLADE = Blade(np.radians(20), 0.1, 0.4)
 RULE = MeshRule.of([BLADE], [BOND])
+#: Of a tool that indents an intact surface, and hardly penetrates it.
+ALIKE = Faces(symmetric=True, firm=True)
 
 
 def block(**sizes):
@@ -57,7 +61,7 @@ def test_a_guide_resists_the_way_off_the_plane_and_nothing_else():
 def pushed(depth, fixture=None, sizes=None, **drive):
     """Intact block and blade: insertion, and columns by name with an entry for each step."""
     rule = {"lc": RULE.size, "entry": RULE.mouth, "band": 2 * RULE.size}
-    body = cracked_block(block(**(rule | (sizes or {}))), SOLID, BOND, viscosity=0.004, faces=Faces(symmetric=True))
+    body = cracked_block(block(**(rule | (sizes or {}))), SOLID, BOND, viscosity=0.004, faces=ALIKE)
     cut = Insertion.build(body, BLADE, Drive(1.0), **({} if fixture is None else {"fixture": fixture}))
     rows = []
 
@@ -85,14 +89,24 @@ def test_an_intact_surface_is_punctured():
 
 def test_a_tool_in_a_notch_is_as_firm_as_on_an_intact_surface_where_faces_are():
     """So that nothing but the puncture tells two cuts apart."""
-    firm, soft = (
+    firm, soft, alike, both = (
         Insertion.build(cracked_block(block(notch=0.3), SOLID, BOND, faces=faces), BLADE, Drive(1.0), notch=0.3)
-        for faces in (Faces(firm=True), Faces())
+        for faces in (Faces(firm=True), Faces(), Faces(symmetric=True), ALIKE)
     )
     size = firm.body.cracks[0].normal_size
-    for contact in firm.contacts:
+    for contact in (*firm.contacts, *both.contacts):
         assert contact.contact == BLADE.firm_contact(SOLID.young, size)
-    assert soft.contacts[0].contact == BLADE.soft_contact(SOLID.young, size)
+    cutting = BLADE.soft_contact(SOLID.young, size)
+    assert soft.contacts[0].contact == cutting
+    assert alike.contacts[0].contact == replace(cutting, stiffness=4 * cutting.stiffness)
+
+
+def test_halves_that_are_spread_in_a_notch_press_on_nothing_at_first():
+    cut = Insertion.build(
+        cracked_block(block(notch=0.3), SOLID, BOND, faces=Faces(symmetric=True)), BLADE, Drive(1.0), notch=0.3
+    )
+    assert all(contact.contact.clearance > 0 for contact in cut.contacts)
+    assert [contact.energies()["contact"] for contact in cut.contacts] == pytest.approx([0.0, 0.0], abs=1e-18)
 
 
 def test_faces_of_a_thread_are_not_alike():

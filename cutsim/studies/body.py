@@ -43,14 +43,16 @@ class Faces:
     rubbing tool draws along beside each other slide: a pair of surfaces carries their pressure.
 
     Args:
-        symmetric: Whether body and tool are alike on both sides of a plane crack.
+        symmetric: Whether body and tool are alike on both sides of a plane crack. The faces then press firmly on each
+            other, and the tool on them four times as firmly as in other cuts, since it may indent them before.
         sliding: Whether the faces slide over each other by more than a facet, as at the rim of a notch into which a
             tool with much friction is pushed. They then look for each other anew, at a higher cost.
         automatic: Whether all surfaces of the body may meet, in place of the two faces: where a rough tool draws the
             rim of a notch in so far that it folds, the outer surface comes to lie on itself and on the faces.
         firm: Whether tool and faces penetrate each other as little as under a tip that indents an intact surface, and
             the faces part along the normal that they had: for an edge that goes round a body of revolution, and for a
-            cut from a notch that is compared with a puncture. Faces that are alike are firm in any case.
+            cut from a notch that is compared with a puncture. An edge of one element catches on the nodes then, and
+            takes several times as many steps.
         friction: Friction of the faces on each other, a law, or the coefficient of Coulomb's; None for none. It acts
             where the bond is broken.
 

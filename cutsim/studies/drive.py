@@ -172,10 +172,18 @@ class Motion:
         start = self.start_depth if halves else -np.inf
         return ToolPath(lambda time: frame.point(max(self.depth(time), start)), self.corners)
 
-    def path(self, frame: Frame, tool: Insertable) -> ToolPath:
-        """ToolPath of a tool, or of a half of it, in a frame."""
+    def path(self, frame: Frame, tool: Insertable, clearance: float = 0.0) -> ToolPath:
+        """ToolPath of a tool, or of a half of it, in a frame.
+
+        Args:
+            frame: Where the tool enters, and which way it goes.
+            tool: The tool.
+            clearance: Distance at which its contact begins: a half that is spread in a notch comes from there, else it
+                would press on faces that nothing has deformed yet [length].
+        """
         spread = tool.side and self.start_depth
-        return ToolPath(self._sliced(frame, self._spread(frame, tool) if spread else self._lower(frame)), self.corners)
+        push = self._spread(frame, tool, clearance) if spread else self._lower(frame)
+        return ToolPath(self._sliced(frame, push), self.corners)
 
     def _sliced(
         self, frame: Frame, push: Callable[[float], NDArray[np.float64]]
@@ -189,8 +197,8 @@ class Motion:
     def _lower(self, frame: Frame) -> Callable[[float], NDArray[np.float64]]:
         return lambda time: frame.point(self.depth(time))
 
-    def _spread(self, frame: Frame, half: Insertable) -> Callable[[float], NDArray[np.float64]]:
-        start = -half.side * half.half_width(self.start_depth)
+    def _spread(self, frame: Frame, half: Insertable, clearance: float) -> Callable[[float], NDArray[np.float64]]:
+        start = -half.side * (half.half_width(self.start_depth) + clearance)
 
         def position(time: float) -> NDArray[np.float64]:
             still_to_come = max(1 - time / self.entry_time, 0.0)

@@ -225,18 +225,20 @@ def _contacts(
         faces.append(("-", -plus, top[0]))
     intact = body.notch is None and body.state.axisymmetric
     firm = body.faces.firm or intact
+    indenting = body.faces.symmetric and not firm
     found = []
     for face, side, group in faces:
         half = tool if whole else replace(tool, side=side)  # type: ignore[type-var]
         for crack in body.cracks:
-            soft = half.soft_contact(crack.young, crack.normal_size, indenting=body.faces.symmetric)
+            soft = half.soft_contact(crack.young, crack.normal_size, indenting=indenting)
             name = "_".join([_kind(tool), _SIDES[side], *([crack.name] if len(body.cracks) > 1 else [])])
+            law = half.firm_contact(crack.young, crack.normal_size) if firm else soft
             contact = ToolContact(
                 body.state,
                 half,
-                motion.path(frame, half),
+                motion.path(frame, half, law.clearance),
                 _surfaces(body, crack, face, group, DEGREE if firm else _DEGREE),
-                contact=half.firm_contact(crack.young, crack.normal_size) if firm else soft,
+                contact=law,
                 friction=completed(friction, soft.stiffness),
                 name=name,
                 machines=() if carriage is None else carriage,

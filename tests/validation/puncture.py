@@ -113,7 +113,7 @@ class Block:
         sizes |= {"lc": size, "band": 2 * size, "growth": 1.8, "entry": mouth}
         domain = read_geo(geometry("block"), COMM, sizes, gdim=2)
         viscosity = self.damping * self.solid.young
-        return cracked_block(domain, self.solid, self.bond, viscosity=viscosity, faces=Faces(symmetric=True))
+        return cracked_block(domain, self.solid, self.bond, viscosity=viscosity, faces=Faces(symmetric=True, firm=True))
 
 
 def blade(degrees: float, radius: float, half_thickness: float) -> Blade:

@@ -94,7 +94,7 @@ class Wire:
         sizes = {"dim": 2, "Lx": HALF, "H": self.end + BELOW, "notch": self.notch, "deep": self.end + 1.0}
         sizes |= {"lc": self.size, "band": 0.3, "growth": 1.6}
         domain = read_geo(geometry("block"), COMM, sizes, gdim=2)
-        body = cracked_block(domain, SILICONE, BOND, viscosity=VISCOSITY, faces=Faces(symmetric=True))
+        body = cracked_block(domain, SILICONE, BOND, viscosity=VISCOSITY, faces=Faces(symmetric=True, firm=True))
         contacts = []
         for face, aside in (("+", -1.0), ("-", 1.0)):
             places = [(aside * (self.radius + 0.01), -self.start), (0.0, -self.start), (0.0, -self.end)]
