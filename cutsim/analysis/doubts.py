@@ -1,5 +1,7 @@
 """What makes a step questionable whatever the terms are: the energy audit, and friction on a path back in time."""
 
+from collections.abc import Mapping
+
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.base.log import collective_logger
 from cutsim.base.verdict import CLOSURE, Verdict
@@ -43,6 +45,20 @@ def doubt_audit(verdict: Verdict, before: EnergyAudit, after: EnergyAudit, visco
     if held > GIVING * after.scale:
         words = f"contacts hold {held / after.scale:.1%} of the work that is done, and give way: firmer ones are needed"
         verdict.suppose("contact", words)
+
+
+def doubt_distortions(verdict: Verdict, worst: Mapping[str, tuple[float, str]], scale: float) -> None:
+    """Doubt elements that have lost their shape, if they have held as much energy as may be missing in the audit.
+
+    Args:
+        verdict: The verdict.
+        worst: Kind of doubt → most strain energy so far, and words with a place for the ``{share}``.
+        scale: Work that is done: the largest turnover of the audit [energy].
+    """
+    for kind, (energy, words) in worst.items():
+        verdict.withdraw(kind)
+        if energy > CLOSURE * scale:
+            verdict.suppose(kind, words.format(share=f"{energy / scale:.1%} of the work that is done"))
 
 
 def warn_of_jump(carrier: str, entry: str, before: EnergyAudit, after: EnergyAudit, time: float) -> None:

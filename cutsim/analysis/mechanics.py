@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cutsim.analysis.brake import Brake
 from cutsim.analysis.carriers import Carrier
-from cutsim.analysis.doubts import doubt_audit, doubt_way_back, warn_of_jump
+from cutsim.analysis.doubts import doubt_audit, doubt_distortions, doubt_way_back, warn_of_jump
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.equilibrium_path import EquilibriumPath
 from cutsim.analysis.jump_dynamics import JumpDynamics
@@ -28,6 +28,7 @@ from cutsim.base.terms import (
     Columns,
     Cushioned,
     Damaging,
+    Distorted,
     Energetic,
     Interface,
     Joining,
@@ -136,6 +137,7 @@ class Mechanics(Balance[Term, Support]):
         kinds: tuple[type[Brake], type[JumpDynamics]] = (Brake, JumpDynamics)
         self.carriers: tuple[Carrier, ...] = tuple(kind(self.problem, state, terms) for kind in kinds if static)
         self._resisted = state.memory.value("mechanics: viscous work, and what is not set free by the body", (0.0, 0.0))
+        self._distorted = state.memory.value("mechanics: worst of distorted elements", dict[str, tuple[float, str]]())
         self._intersection = SelfIntersection(state)
         self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
@@ -247,8 +249,21 @@ class Mechanics(Balance[Term, Support]):
         doubt_audit(self.state.verdict, self.audit, self.trial_audit, self._resisted.trial[1], cushion)
         for carrier in self.carriers:
             warn_of_jump(carrier.name, carrier.entry, self.audit, self.trial_audit, self.state.time)
+        doubt_distortions(self.state.verdict, self._worst_distortions(), self.trial_audit.scale)
         doubt_way_back(self.state, self.audit, self.trial_audit)
         self._intersection.watch()
+
+    def _worst_distortions(self) -> dict[str, tuple[float, str]]:
+        """Elements that have lost their shape, when they held most energy. Collective.
+
+        On the way of a jump it does not count, if they have regained it when the body rests.
+        """
+        worst = self._distorted.committed
+        if not self.state.jumping:
+            for term in offering(self.terms, Distorted):
+                worst = worst | {k: max(worst.get(k, (0.0, "")), now) for k, now in term.distortions().items()}
+        self._distorted.trial = worst
+        return worst
 
     def reaction(self, held: Support) -> float:
         """Reaction of a support along its direction in the trial state [force]. Collective."""

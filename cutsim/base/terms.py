@@ -292,6 +292,14 @@ class Cushioned(Protocol):
 
 
 @runtime_checkable
+class Distorted(Protocol):
+    """A term of elements whose shape may become one of which the strain energy cannot be trusted."""
+
+    def distortions(self) -> dict[str, tuple[float, str]]:
+        """Kind of doubt → strain energy of such elements, and words with a place for the ``{share}``. Collective."""
+
+
+@runtime_checkable
 class Interface(Protocol):
     """A term that joins the two faces of a crack or of a pair of surfaces.
 

@@ -13,7 +13,6 @@ from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Assembler, Multiplier, Term
-from cutsim.base.verdict import CLOSURE
 from cutsim.bodies.contributions import Contribution, Heating, KelvinVoigt
 from cutsim.bodies.elasticity import Elasticity
 from cutsim.bodies.formulations import FORMULATIONS, Measures
@@ -193,34 +192,26 @@ class Solid(Term):
         """Work of the Kelvin–Voigt viscosity so far, in the trial state [energy]."""
         return sum(part.regularising_work for part in self.contributions)
 
-    def watch(self) -> None:
-        """Doubt elements that are folded or almost flat, if they hold a part of the energy that counts. Collective.
-
-        What a jump does to them on the way does not count, if they are whole again when the body rests.
-        """
-        if self.state.jumping:
-            return
+    def distortions(self) -> dict[str, tuple[float, str]]:
+        """Elements that are turned over at a corner or almost flat: strain energy, words and cure. Collective."""
+        found = {}
         turned = self._volume.turned()
-        if turned is not None and not (share := turned.energy / integrate(self._energy_form)) <= CLOSURE:
-            self.state.verdict.doubt(
-                f"{self.name}: folded",
+        if turned is not None:
+            found[f"{self.name}: folded"] = (
+                turned.energy,
                 f"{self.name}: elements that are turned over at a corner, as at {place(turned.place)} with "
-                f"J = {turned.smallest:.2g}, hold {share:.1%} of the strain energy: see what smaller ones change",
-                share,
+                f"J = {turned.smallest:.2g}, hold {{share}}: see what smaller ones change",
             )
         smallest = self.smallest_jacobian()
-        if not smallest < _FLAT:
-            return
-        share = self._volume.held_below(_FLAT) / integrate(self._energy_form)
-        if not share <= CLOSURE:
+        if smallest < _FLAT:
             # where elements of degree 1 are folded, smaller ones are so too
             cure = "smaller ones" if self.state.V.ufl_element().degree > 1 else "smaller ones, or those of degree 2,"
-            self.state.verdict.doubt(
-                f"{self.name}: J",
-                f"{self.name}: elements that are squeezed to {smallest:.2g} of their volume hold {share:.1%} of the "
-                f"strain energy, {cure} are needed",
-                share,
+            found[f"{self.name}: J"] = (
+                self._volume.held_below(_FLAT),
+                f"{self.name}: elements that are squeezed to {smallest:.2g} of their volume hold {{share}}, "
+                f"{cure} are needed",
             )
+        return found
 
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""

@@ -124,7 +124,7 @@ class State:
 
     @property
     def jumping(self) -> bool:
-        """Whether the trial step is one across a jump, after which the body does not yet rest."""
+        """Whether the trial step, which is accepted, is one across a jump, after which the body does not yet rest."""
         return bool(self.pace.trial.carrier)
 
     @property
