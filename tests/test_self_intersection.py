@@ -36,7 +36,7 @@ def test_elements_that_are_turned_over_at_a_corner(degree, moved, stretch):
     state.u.interpolate(motion)
     assert solid.smallest_jacobian() > 0
     found = solid.distortions()
-    assert set(found) == ({"body: folded"} if moved > 0.5 else set())
+    assert ("body: folded" in found) == (moved > 0.5)
     work = solid.energies()["strain"]
     doubt_distortions(state.verdict, found, work)
     words = f"turned over at a corner, as at (0, 1) with J = {1 - 2 * moved:.2g}, hold 100.0% of the work that is done"
@@ -69,11 +69,17 @@ def test_jaws_that_close_beyond_each_other(kind, layers):
 
     state.u.interpolate(lambda x: np.stack([*([0 * x[0]] * (gdim - 1)), -down(x[0])]), above)
     state.u.x.scatter_forward()
-    SelfIntersection(state).watch()
+    found = SelfIntersection(state).found()
     x = np.arange(n + 1) / n
     depth = n * np.minimum(down(x), 1 - x)
-    words = f"passes through itself by {depth.max():.2g} of an element at ({x[depth.argmax()]:.4g}, "
-    assert words in str(state.verdict) if layers > 0.5 else state.verdict.trusted
+    assert (found is not None) == (layers > 0.5)
+    if found is not None:
+        words = f"passes through itself by {depth.max():.2g} of an element at ({x[depth.argmax()]:.4g}, "
+        assert words in found.words
+        # those that a deep node has entered, and those to which such a node belongs
+        per_cell = {"quadrilateral": 1, "triangle": 2, "hexahedron": 1, "tetrahedron": 6}[kind] * n ** (gdim - 2)
+        taken = state.mesh.comm.allreduce(int(found.cells.sum()))
+        assert 0 < taken <= per_cell * 2 * 3 * n
 
 
 @pytest.mark.mpi
@@ -86,4 +92,4 @@ def test_a_run_in_which_nothing_keeps_the_jaws_apart():
     run(mechanics, 0.2, StepControl.fixed(0.2))
     assert "surface" not in state.verdict.doubts
     run(mechanics, 1.0, StepControl.fixed(0.2))
-    assert "surface" in state.verdict.doubts
+    assert "which may change" in state.verdict.doubts["surface"]

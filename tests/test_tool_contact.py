@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
@@ -12,7 +13,7 @@ from cutsim.bodies.loads import Support
 from cutsim.bodies.solid import Solid
 from cutsim.fields.points import Surface
 from cutsim.fields.state import State
-from cutsim.interface.contact import PenaltyContact
+from cutsim.interface.contact import HardeningContact, PenaltyContact, SoftenedContact
 from cutsim.interface.friction import SmoothCoulomb
 from cutsim.materials.elastic import NeoHookean
 from cutsim.solvers.convergence import Tolerances
@@ -76,6 +77,29 @@ def test_frictionless_contact_force_is_the_derivative_of_its_energy():
             energies.append(ball.energies()["contact"])
         ball.position.value[:] = place
         assert force == pytest.approx(-(energies[0] - energies[1]) / (2 * h), abs=1e-7)
+
+
+@pytest.mark.parametrize("kind", [SoftenedContact, HardeningContact])
+def test_a_softened_contact_is_the_derivative_of_its_energy_and_has_an_inverse(kind):
+    """From the clearance on, where the pressure begins with no slope; the hardening one has the slope ε at s = c."""
+    law, depth, h = kind(stiffness=3.0, blend=0.4, clearance=0.2), np.linspace(-0.5, 2.0, 101), 1e-5
+
+    def of(value, at):
+        return np.array([float(value(ufl.as_ufl(float(x)))) for x in at])
+
+    pressure = of(law.pressure, depth)
+    np.testing.assert_allclose(
+        (of(law.energy, depth + h) - of(law.energy, depth - h)) / (2 * h), pressure, atol=1e-8, rtol=1e-8
+    )
+    touched = depth > -law.clearance
+    assert not pressure[~touched].any() and (pressure[touched] > 0).all()
+    np.testing.assert_allclose(law.penetration(pressure[touched]), depth[touched], atol=1e-9)
+    if kind is HardeningContact:
+        at = law.blend - law.clearance
+        ahead, behind = of(law.pressure, [at + h, at - h])
+        assert (ahead - behind) / (2 * h) == pytest.approx(law.stiffness, rel=1e-6)
+        with pytest.raises(ValueError, match="blend"):
+            HardeningContact(1.0, 0.0, 0.1)
 
 
 def rigid_block_under_plate(path, friction):

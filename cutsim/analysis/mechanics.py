@@ -251,7 +251,6 @@ class Mechanics(Balance[Term, Support]):
             warn_of_jump(carrier.name, carrier.entry, self.audit, self.trial_audit, self.state.time)
         doubt_distortions(self.state.verdict, self._worst_distortions(), self.trial_audit.scale)
         doubt_way_back(self.state, self.audit, self.trial_audit)
-        self._intersection.watch()
 
     def _worst_distortions(self) -> dict[str, tuple[float, str]]:
         """Elements that have lost their shape, when they held most energy. Collective.
@@ -261,7 +260,10 @@ class Mechanics(Balance[Term, Support]):
         worst = self._distorted.committed
         if not self.state.jumping:
             for term in offering(self.terms, Distorted):
-                worst = worst | {k: max(worst.get(k, (0.0, "")), now) for k, now in term.distortions().items()}
+                worst = _worse(worst, term.distortions())
+            if (through := self._intersection.found()) is not None:
+                energy = sum((body.at_stake(through.cells) for body in offering(self.terms, Distorted)), start=0.0)
+                worst = _worse(worst, {"surface": (energy, through.words)})
         self._distorted.trial = worst
         return worst
 
@@ -279,6 +281,10 @@ class Mechanics(Balance[Term, Support]):
         for observer in self._observers:
             columns |= observer.record()
         return columns | self.trial_audit.record()
+
+
+def _worse(worst: dict[str, tuple[float, str]], now: dict[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
+    return worst | {kind: max(worst.get(kind, (0.0, "")), found) for kind, found in now.items()}
 
 
 def _settled(terms: Sequence[Term], solve: Callable[[], Outcome]) -> Outcome:

@@ -298,6 +298,9 @@ class Distorted(Protocol):
     def distortions(self) -> dict[str, tuple[float, str]]:
         """Kind of doubt → strain energy of such elements, and words with a place for the ``{share}``. Collective."""
 
+    def at_stake(self, cells: NDArray[np.bool_]) -> float:
+        """Energy that would change if some of the owned cells of the mesh were of another shape. Collective."""
+
 
 @runtime_checkable
 class Interface(Protocol):

@@ -213,6 +213,17 @@ class Solid(Term):
             )
         return found
 
+    def at_stake(self, cells: NDArray[np.bool_]) -> float:
+        """Energy that would change if some elements were deformed by their own size in another way. Collective.
+
+        It is the strain energy that they hold, and that of a strain of one: half of Young's modulus by their volume.
+
+        Args:
+            cells: Of each owned cell of the mesh, whether it is one of them.
+        """
+        held, volume = self._volume.held(cells)
+        return held + 0.5 * self.material.young * volume
+
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""
         smallest = self.smallest_jacobian()

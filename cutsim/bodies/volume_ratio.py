@@ -73,6 +73,10 @@ class VolumeRatio:
             return None
         return Turned(smallest, np.array(place[: state.mesh.geometry.dim]), self._held(values.min(axis=1) < 0))
 
+    def held(self, cells: NDArray[np.bool_]) -> tuple[float, float]:
+        """Strain energy and reference volume of the body in some of the owned cells of the mesh. Collective."""
+        return self._held(cells[self._owned]), integrate(self._room)
+
     def _held(self, where: NDArray[np.bool_]) -> float:
         """Strain energy of some of the owned cells of the body [energy]. Collective."""
         self._counted.x.array[self._owned] = where
@@ -118,3 +122,7 @@ class VolumeRatio:
         state, formulation = self._elasticity.state, self._formulation
         parts = formulation.parts(self._elasticity.deformation_gradient(state.u))
         return form(sum(self._counted * W * dx for W, dx in zip(parts, formulation.measures, strict=True)))
+
+    @cached_property
+    def _room(self) -> fem.Form:
+        return form(self._counted * self._formulation.measures[0])

@@ -107,3 +107,41 @@ class SoftenedContact(PenaltyContact):
     def energy(self, penetration: Expr) -> Expr:
         """Energy ∫ p dδ stored since the pressure began [force/length]."""
         return super().energy(penetration + self.clearance)
+
+
+@checked
+@dataclass(frozen=True)
+class HardeningContact(SoftenedContact):
+    """Softened contact whose pressure grows with the third power: p = ε s³/(3c²) with s = δ + clearance.
+
+    At the pressures of a cut it is so soft that an edge does not catch on the nodes, and at those of an indentation,
+    which may be thirty times as large, it gives way little more.
+
+    Args:
+        stiffness: Its slope ε > 0 at s = c [stress/length].
+        blend: This length, c > 0 [length].
+        clearance: Distance of the surfaces at which the pressure begins, ≥ 0 [length].
+
+    Raises:
+        ValueError: A value is outside its range.
+    """
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_number("blend", self.blend, positive)
+
+    @property
+    def _factor(self) -> float:
+        return self.stiffness / (3 * self.blend**2)
+
+    def pressure(self, penetration: Expr) -> Expr:
+        """Contact pressure p ≥ 0 [stress] at a penetration (positive inside) [length]."""
+        return self._factor * positive_part(penetration + self.clearance) ** 3
+
+    def penetration(self, pressure: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Least penetration with a pressure ≥ 0, the inverse of `pressure` [length]."""
+        return np.cbrt(pressure / self._factor) - self.clearance
+
+    def energy(self, penetration: Expr) -> Expr:
+        """Energy ∫ p dδ stored since the pressure began [force/length]."""
+        return 0.25 * self._factor * positive_part(penetration + self.clearance) ** 4

@@ -64,6 +64,29 @@ class _Cells:
     depth: Array
 
 
+@dataclass(frozen=True)
+class Intersection:
+    """Where a surface lies in its own body.
+
+    Attributes:
+        depth: Of the deepest node, in elements [–].
+        place: Where this node is now [length].
+        cells: Of each owned cell, whether such a node is in it or belongs to it.
+    """
+
+    depth: float
+    place: list[float]
+    cells: NDArray[np.bool_]
+
+    @property
+    def words(self) -> str:
+        """What to say of it, with a place for the ``{share}`` of the work that it may change."""
+        return (
+            f"the surface passes through itself by {self.depth:.2g} of an element at {place(self.place)}, which may "
+            "change {share}: see what smaller ones change there, or a contact of all surfaces ('automatic')"
+        )
+
+
 class SelfIntersection:
     """Finds nodes of the surface, outer or of cracks, that have come into the body to which they belong.
 
@@ -78,31 +101,17 @@ class SelfIntersection:
     def __init__(self, state: State) -> None:
         self._state = state
 
-    def watch(self) -> None:
-        """Doubt a surface that has passed through itself by a part of an element. Collective.
-
-        One that does so only while the body jumps is none that the state at rest knows of.
-        """
+    def found(self) -> Intersection | None:
+        """Where the surface lies in its own body by more than a part of an element now; None if nowhere. Collective."""
         mesh, degree = self._state.mesh, self._state.V.ufl_element().degree
-        if self._state.jumping or not 1 < mesh.topology.dim == mesh.geometry.dim or degree > 2:
-            return
-        depth, where = min(mesh.comm.allgather(self._deepest()))
-        if -depth > DEEP:
-            self._state.verdict.doubt(
-                "surface",
-                f"the surface passes through itself by {-depth:.2g} of an element at {place(where)}: see what smaller "
-                "ones change there, or a contact of all surfaces ('automatic')",
-                -depth,
-            )
-
-    def _deepest(self) -> tuple[float, list[float]]:
-        """Minus the depth in elements of the deepest node in the cells of this rank, and its place. Collective."""
+        if not 1 < mesh.topology.dim == mesh.geometry.dim or degree > 2:
+            return None
         V, u, cells = self._state.V, self._state.u.x.array, self._cells
-        gdim = V.mesh.geometry.dim
+        gdim = mesh.geometry.dim
         points = self._surface.nodes(u, start=False).reshape(-1, gdim)[self._nodes.rows]
         corners = cells.reference + u.reshape(-1, gdim)[cells.nodes]
         rows, inside = self._candidates(corners, points)
-        deepest: tuple[float, list[float]] = (0.0, [])
+        within = np.zeros(len(rows))
         for simplex in _SIMPLICES[V.element.basix_element.cell_type]:
             x, depth = corners[rows][:, simplex], cells.depth[rows][:, simplex]
             edges = x[:, 1:] - x[:, :1]
@@ -111,11 +120,18 @@ class SelfIntersection:
             away = points[inside[some]] - x[some, 0]
             shares = np.linalg.solve(np.swapaxes(edges[some], 1, 2), away[..., None])[..., 0]
             shares = np.column_stack([1 - shares.sum(axis=1), shares])
-            found = np.where(shares.min(axis=1) >= -_ROUNDING, (shares * depth[some]).sum(axis=1), 0.0)
-            if found.max(initial=0.0) > -deepest[0]:
-                at = points[inside[some][found.argmax()]]
-                deepest = -float(found.max()), at.tolist()
-        return deepest
+            here = np.where(shares.min(axis=1) >= -_ROUNDING, (shares * depth[some]).sum(axis=1), 0.0)
+            within[some] = np.maximum(within[some], here)
+        deepest = int(within.argmax()) if len(within) else None
+        mine = (0.0, []) if deepest is None else (-float(within[deepest]), points[inside[deepest]].tolist())
+        depth, where = min(mesh.comm.allgather(mine))
+        if -depth <= DEEP:
+            return None
+        deep = within > DEEP
+        nodes = np.unique(np.concatenate(mesh.comm.allgather(self._nodes.numbers[inside[deep]])))
+        taken = np.isin(cells.numbers, nodes).any(axis=1)
+        taken[rows[deep]] = True
+        return Intersection(-depth, where, taken)
 
     def _candidates(self, corners: Array, points: Array) -> tuple[Indices, Indices]:
         """Cells and nodes of the surface in their boxes that belong to the same body, and not to the cell."""

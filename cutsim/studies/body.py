@@ -44,7 +44,7 @@ class Faces:
 
     Args:
         symmetric: Whether body and tool are alike on both sides of a plane crack. The faces then press firmly on each
-            other, and the tool on them four times as firmly as in other cuts, since it may indent them before.
+            other, and the tool more firmly the harder it presses, since it may indent them before.
         sliding: Whether the faces slide over each other by more than a facet, as at the rim of a notch into which a
             tool with much friction is pushed. They then look for each other anew, at a higher cost.
         automatic: Whether all surfaces of the body may meet, in place of the two faces: where a rough tool draws the

@@ -4,13 +4,13 @@ from abc import ABC, abstractmethod
 from typing import ClassVar
 
 from cutsim.base.kinematics import Expr
-from cutsim.interface.contact import PenaltyContact, SoftenedContact
+from cutsim.interface.contact import HardeningContact, PenaltyContact, SoftenedContact
 from cutsim.tools.shapes import Direction
 
 # penalty over E/h and half the width of the quadratic start over h, for an intact surface
 _FIRM, _BLEND = 1000.0, 0.1
-# how much stiffer than in a cut the contact is of a tool that may also indent: it presses with several times E
-_INDENTING = 4.0
+# how much larger than in a cut the slope ε is of a tool that may also indent: at a pressure of E it is twice as stiff
+_INDENTING = 2.0
 
 
 class Insertable(ABC):
@@ -74,12 +74,12 @@ class Insertable(ABC):
         Args:
             young: Young's modulus of the solid [stress].
             h: Size of its cells normal to the surface [length].
-            indenting: Whether it may also indent the solid, with several times Young's modulus; it is then four
-                times as stiff.
+            indenting: Whether it may also indent the solid, by pressures of up to thirty times Young's modulus.
         """
         penalty, blend, clearance = self.firmness
-        factor = _INDENTING if indenting else 1.0
-        return SoftenedContact(factor * penalty * young / h, blend * h, clearance * h)
+        if indenting:
+            return HardeningContact(_INDENTING * penalty * young / h, blend * h, clearance * h)
+        return SoftenedContact(penalty * young / h, blend * h, clearance * h)
 
     @staticmethod
     def firm_contact(young: float, h: float) -> PenaltyContact:

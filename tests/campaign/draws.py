@@ -25,7 +25,7 @@ _EDGE = 2.0  # length of the cutting edge in space, halved by symmetry [mm]
 # largest characteristic opening ε: e ε is a little more than half of the blade's thickness [mm]
 _OPENING = _HALF_THICKNESS / 2
 # viscosity of the body over G_c and the speed of the tool: it takes about this share of what is lost
-_DAMPING = 1e-3
+_DAMPING = 5e-4
 _RISE = 0.1  # of a bilinear law: part of the final opening at which the strength is reached
 
 
