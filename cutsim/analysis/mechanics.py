@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from cutsim.analysis.brake import Brake
 from cutsim.analysis.carriers import Carrier
-from cutsim.analysis.doubts import doubt_audit, doubt_distortions, doubt_way_back, warn_of_jump
+from cutsim.analysis.distortions import Distortions
+from cutsim.analysis.doubts import doubt_audit, doubt_way_back, warn_of_jump
 from cutsim.analysis.energy import EnergyAudit
 from cutsim.analysis.equilibrium_path import EquilibriumPath
 from cutsim.analysis.jump_dynamics import JumpDynamics
@@ -28,7 +29,6 @@ from cutsim.base.terms import (
     Columns,
     Cushioned,
     Damaging,
-    Distorted,
     Energetic,
     Interface,
     Joining,
@@ -48,7 +48,6 @@ from cutsim.fields.cells import check_disjoint
 from cutsim.fields.crack_checks import check_cracks
 from cutsim.fields.state import State
 from cutsim.fields.twins import unjoined
-from cutsim.pairs.self_intersection import SelfIntersection
 from cutsim.solvers.balance import Balance
 from cutsim.solvers.convergence import TOLERANCES, Criteria, Tolerances
 from cutsim.solvers.iterations import Outcome
@@ -137,8 +136,7 @@ class Mechanics(Balance[Term, Support]):
         kinds: tuple[type[Brake], type[JumpDynamics]] = (Brake, JumpDynamics)
         self.carriers: tuple[Carrier, ...] = tuple(kind(self.problem, state, terms) for kind in kinds if static)
         self._resisted = state.memory.value("mechanics: viscous work, and what is not set free by the body", (0.0, 0.0))
-        self._distorted = state.memory.value("mechanics: worst of distorted elements", dict[str, tuple[float, str]]())
-        self._intersection = SelfIntersection(state)
+        self._distortions = Distortions(state, terms)
         self._begun, self._moved = (state.memory.value(f"mechanics: {what}", False) for what in ("begun", "moved"))
 
     @property
@@ -249,23 +247,8 @@ class Mechanics(Balance[Term, Support]):
         doubt_audit(self.state.verdict, self.audit, self.trial_audit, self._resisted.trial[1], cushion)
         for carrier in self.carriers:
             warn_of_jump(carrier.name, carrier.entry, self.audit, self.trial_audit, self.state.time)
-        doubt_distortions(self.state.verdict, self._worst_distortions(), self.trial_audit.scale)
+        self._distortions.watch(self.trial_audit.scale)
         doubt_way_back(self.state, self.audit, self.trial_audit)
-
-    def _worst_distortions(self) -> dict[str, tuple[float, str]]:
-        """Elements that have lost their shape, when they held most energy. Collective.
-
-        On the way of a jump it does not count, if they have regained it when the body rests.
-        """
-        worst = self._distorted.committed
-        if not self.state.jumping:
-            for term in offering(self.terms, Distorted):
-                worst = _worse(worst, term.distortions())
-            if (through := self._intersection.found()) is not None:
-                energy = sum((body.at_stake(through.cells) for body in offering(self.terms, Distorted)), start=0.0)
-                worst = _worse(worst, {"surface": (energy, through.words)})
-        self._distorted.trial = worst
-        return worst
 
     def reaction(self, held: Support) -> float:
         """Reaction of a support along its direction in the trial state [force]. Collective."""
@@ -281,10 +264,6 @@ class Mechanics(Balance[Term, Support]):
         for observer in self._observers:
             columns |= observer.record()
         return columns | self.trial_audit.record()
-
-
-def _worse(worst: dict[str, tuple[float, str]], now: dict[str, tuple[float, str]]) -> dict[str, tuple[float, str]]:
-    return worst | {kind: max(worst.get(kind, (0.0, "")), found) for kind, found in now.items()}
 
 
 def _settled(terms: Sequence[Term], solve: Callable[[], Outcome]) -> Outcome:

@@ -8,13 +8,14 @@ import ufl
 from numpy.typing import NDArray
 
 from cutsim.base.assembly import integrate
-from cutsim.base.checks import nonnegative, place, positive, require, require_number
+from cutsim.base.checks import nonnegative, positive, require, require_number
 from cutsim.base.compat import form
 from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Assembler, Multiplier, Term
 from cutsim.bodies.contributions import Contribution, Heating, KelvinVoigt
 from cutsim.bodies.elasticity import Elasticity
+from cutsim.bodies.element_shapes import ElementShapes
 from cutsim.bodies.formulations import FORMULATIONS, Measures
 from cutsim.bodies.overstress import Overstress
 from cutsim.bodies.quadrature import strain_energy_measures
@@ -24,11 +25,6 @@ from cutsim.fields.temperature import Temperature
 from cutsim.materials.elastic import Material, inside_out
 from cutsim.materials.thermoelastic import ThermoElastic
 from cutsim.materials.viscoelastic import Prony
-
-# volume ratio below which an element is no longer to be trusted: its stiffness may be wrong by a factor. This changes
-# the energy of the body, and with it force and work, by about what such elements hold: as much as may be missing in the
-# audit is no reason against a result
-_FLAT = 0.1
 
 
 class Solid(Term):
@@ -88,6 +84,7 @@ class Solid(Term):
         self.formulation = FORMULATIONS[volumetric](elasticity, measures, cells)
         self._energy_form = form(self.formulation.stored(state.u))
         self._volume, self._inside_out = VolumeRatio(self.formulation, cells), inside_out(material)
+        self._shapes = ElementShapes(name, self._volume, material, state.V.ufl_element().degree)
         self.contributions = tuple(self._contributions(viscosity, relaxation, thermoelastic))
 
     def _contributions(
@@ -194,35 +191,11 @@ class Solid(Term):
 
     def distortions(self) -> dict[str, tuple[float, str]]:
         """Elements that are turned over at a corner or almost flat: strain energy, words and cure. Collective."""
-        found = {}
-        turned = self._volume.turned()
-        if turned is not None:
-            found[f"{self.name}: folded"] = (
-                turned.energy,
-                f"{self.name}: elements that are turned over at a corner, as at {place(turned.place)} with "
-                f"J = {turned.smallest:.2g}, hold {{share}}: see what smaller ones change",
-            )
-        smallest = self.smallest_jacobian()
-        if smallest < _FLAT:
-            # where elements of degree 1 are folded, smaller ones are so too
-            cure = "smaller ones" if self.state.V.ufl_element().degree > 1 else "smaller ones, or those of degree 2,"
-            found[f"{self.name}: J"] = (
-                self._volume.held_below(_FLAT),
-                f"{self.name}: elements that are squeezed to {smallest:.2g} of their volume hold {{share}}, "
-                f"{cure} are needed",
-            )
-        return found
+        return self._shapes.distortions()
 
     def at_stake(self, cells: NDArray[np.bool_]) -> float:
-        """Energy that would change if some elements were deformed by their own size in another way. Collective.
-
-        It is the strain energy that they hold, and that of a strain of one: half of Young's modulus by their volume.
-
-        Args:
-            cells: Of each owned cell of the mesh, whether it is one of them.
-        """
-        held, volume = self._volume.held(cells)
-        return held + 0.5 * self.material.young * volume
+        """Energy that would change if some of the owned cells of the mesh were of another shape. Collective."""
+        return self._shapes.at_stake(cells)
 
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""

@@ -1,0 +1,50 @@
+"""What a run may have lost by elements without shape, and by surfaces that pass through themselves."""
+
+from collections.abc import Sequence
+
+from cutsim.analysis.doubts import doubt_distortions
+from cutsim.base.terms import Distorted, Term, offering
+from cutsim.fields.state import State
+from cutsim.pairs.self_intersection import SelfIntersection
+
+#: Kind of doubt → energy that is at stake, and words with a place for its ``{share}`` of the work that is done.
+Found = dict[str, tuple[float, str]]
+
+
+class Distortions:
+    """The worst distortions of a run so far, each with the energy that is at stake.
+
+    Args:
+        state: Displacement and time.
+        terms: The terms of the problem.
+    """
+
+    def __init__(self, state: State, terms: Sequence[Term]) -> None:
+        self._state, self._bodies = state, offering(terms, Distorted)
+        self._worst = state.memory.value("mechanics: worst distortions", Found())
+        self._intersection = SelfIntersection(state)
+
+    def watch(self, scale: float) -> None:
+        """Doubt what may change more of the work than may be missing in the audit. Collective.
+
+        What happens on the way of a jump does not count, if it is over when the body rests.
+
+        Args:
+            scale: Work that is done: the largest turnover of the audit [energy].
+        """
+        worst = self._worst.committed
+        if not self._state.jumping:
+            for kind, found in self._now().items():
+                worst = worst | {kind: max(worst.get(kind, (0.0, "")), found)}
+        self._worst.trial = worst
+        doubt_distortions(self._state.verdict, worst, scale)
+
+    def _now(self) -> Found:
+        """Distortions of the trial state. Collective."""
+        found: Found = {}
+        for body in self._bodies:
+            found |= body.distortions()
+        through = self._intersection.found()
+        if through is not None:
+            found["surface"] = sum((b.at_stake(through.cells) for b in self._bodies), start=0.0), through.words
+        return found
