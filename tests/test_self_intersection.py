@@ -93,3 +93,19 @@ def test_a_run_in_which_nothing_keeps_the_jaws_apart():
     assert "surface" not in state.verdict.doubts
     run(mechanics, 1.0, StepControl.fixed(0.2))
     assert "which may change" in state.verdict.doubts["surface"]
+
+
+@pytest.mark.mpi
+def test_what_is_at_stake_with_elements_that_are_in_each_others_way():
+    """What they hold, and ½ E ε² by their volume: the lower half of a square, and the upper one."""
+    state, above = clamp(mesh.CellType.quadrilateral)
+    solid = Solid(state, NeoHookean(E, 0.0))
+    owned = state.mesh.topology.index_map(2).size_local
+    below = np.ones(owned, dtype=bool)
+    below[above[above < owned]] = False
+    assert solid.at_stake(below, 0.6) == pytest.approx(0.5 * E * 0.6**2 * 0.5)
+    state.u.interpolate(lambda x: np.stack([0.3 * x[0], 0 * x[0]]))
+    held = 0.5 * solid.energies()["strain"]
+    assert held > 0
+    assert solid.at_stake(below, 0.0) == pytest.approx(held)
+    assert solid.at_stake(~below, 0.6) == pytest.approx(held + 0.5 * E * 0.6**2 * 0.5)

@@ -46,5 +46,8 @@ class Distortions:
             found |= body.distortions()
         through = self._intersection.found()
         if through is not None:
-            found["surface"] = sum((b.at_stake(through.cells) for b in self._bodies), start=0.0), through.words
+            # to get out of each other's way they are strained by their depth in elements, hardly by more than one
+            strain = min(through.depth, 1.0)
+            energy = sum((body.at_stake(through.cells, strain) for body in self._bodies), start=0.0)
+            found["surface"] = energy, through.words
         return found

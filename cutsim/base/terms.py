@@ -298,8 +298,8 @@ class Distorted(Protocol):
     def distortions(self) -> dict[str, tuple[float, str]]:
         """Kind of doubt → strain energy of such elements, and words with a place for the ``{share}``. Collective."""
 
-    def at_stake(self, cells: NDArray[np.bool_]) -> float:
-        """Energy that would change if some of the owned cells of the mesh were of another shape. Collective."""
+    def at_stake(self, cells: NDArray[np.bool_], strain: float) -> float:
+        """Energy that would change if some owned cells of the mesh were strained otherwise by so much. Collective."""
 
 
 @runtime_checkable

@@ -47,13 +47,12 @@ class ElementShapes:
             )
         return found
 
-    def at_stake(self, cells: NDArray[np.bool_]) -> float:
-        """Energy that would change if some elements were deformed by their own size in another way. Collective.
-
-        It is the strain energy that they hold, and that of a strain of one: half of Young's modulus by their volume.
+    def at_stake(self, cells: NDArray[np.bool_], strain: float) -> float:
+        """Energy that would change if some elements were deformed otherwise: what they hold, and ½ E ε² V. Collective.
 
         Args:
             cells: Of each owned cell of the mesh, whether it is one of them.
+            strain: Strain ε by which their deformation would differ [–].
         """
         held, volume = self._volume.held(cells)
-        return held + 0.5 * self._material.young * volume
+        return held + 0.5 * self._material.young * strain**2 * volume

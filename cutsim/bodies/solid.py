@@ -193,9 +193,9 @@ class Solid(Term):
         """Elements that are turned over at a corner or almost flat: strain energy, words and cure. Collective."""
         return self._shapes.distortions()
 
-    def at_stake(self, cells: NDArray[np.bool_]) -> float:
-        """Energy that would change if some of the owned cells of the mesh were of another shape. Collective."""
-        return self._shapes.at_stake(cells)
+    def at_stake(self, cells: NDArray[np.bool_], strain: float) -> float:
+        """Energy that would change if some owned cells of the mesh were strained otherwise by so much. Collective."""
+        return self._shapes.at_stake(cells, strain)
 
     def diagnose(self) -> str | None:
         """Name the body if an element is inverted. Collective."""
