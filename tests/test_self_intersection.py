@@ -43,6 +43,8 @@ def test_elements_that_are_turned_over_at_a_corner(degree, moved, stretch):
     assert words in str(state.verdict) if moved > 0.5 and not stretch else state.verdict.trusted
     doubt_distortions(state.verdict, found, 60 * work)
     assert state.verdict.trusted, "in the end it was a small part"
+    doubt_distortions(state.verdict, found, 0.0)
+    assert state.verdict.trusted != bool(found), "before any work is done it is all"
 
 
 def clamp(kind, n=8):

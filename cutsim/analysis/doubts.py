@@ -58,7 +58,8 @@ def doubt_distortions(verdict: Verdict, worst: Mapping[str, tuple[float, str]], 
     for kind, (energy, words) in worst.items():
         verdict.withdraw(kind)
         if energy > CLOSURE * scale:
-            verdict.suppose(kind, words.format(share=f"{energy / scale:.1%} of the work that is done"))
+            share = f"{energy / scale:.1%}" if scale > 0 else "all"  # nothing has been done yet
+            verdict.suppose(kind, words.format(share=f"{share} of the work that is done"))
 
 
 def warn_of_jump(carrier: str, entry: str, before: EnergyAudit, after: EnergyAudit, time: float) -> None:
