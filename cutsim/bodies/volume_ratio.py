@@ -75,7 +75,8 @@ class VolumeRatio:
 
     def held(self, cells: NDArray[np.bool_]) -> tuple[float, float]:
         """Strain energy and reference volume of the body in some of the owned cells of the mesh. Collective."""
-        return self._held(cells[self._owned]), integrate(self._room)
+        energy = self._held(cells[self._owned])
+        return energy, integrate(self._room)  # of the cells that have just been counted
 
     def _held(self, where: NDArray[np.bool_]) -> float:
         """Strain energy of some of the owned cells of the body [energy]. Collective."""
