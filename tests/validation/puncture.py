@@ -127,7 +127,7 @@ SILICONE = Block("silicone", STRIP, STRIP_BOND, blade(20, 0.1, 0.4), 1e-3, 0.3, 
 SHARP = replace(SILICONE, name="silicone, sharp", blade=blade(20, 0.05, 0.4))
 RUBBED = replace(SILICONE, name="silicone, friction 0.3", friction=0.3)
 BLOCKS = (
-    Block("gel", GEL, GEL_BOND, blade(15, 0.3, 0.75), 5e-4, 0.6, 0.8, 5.0, 3.0),
+    Block("gel", GEL, GEL_BOND, blade(15, 0.3, 0.75), 5e-4, 0.6, 0.8, 3.0, 3.0),
     SILICONE,
     SHARP,
     RUBBED,
