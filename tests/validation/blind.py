@@ -45,7 +45,7 @@ class Model:
         self._law, self._degree = law, degree
 
     def __call__(self, values: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
-        return cut(self._domain, self._specimen, SOLID, self._law(values), values["friction"], self._degree)
+        return cut(self._domain, self._specimen, SOLID, self._law(values), values["friction"], degree=self._degree)
 
 
 def recovered(truth: Model, model: Model, noise: float, unknown: tuple[str, str]) -> dict[str, float]:
