@@ -151,6 +151,84 @@ def test_in_register_the_pair_is_the_crack(gdim):
     np.testing.assert_allclose(ends[1], ends[0], rtol=5e-4)
 
 
+# energy of faces that just touch, which count as pressed
+TOUCHED = 1e-20
+
+
+def held_by_all_surfaces(b, moves, **options):
+    """What the contact of all surfaces holds after some moves, each a step."""
+    pair = ContactSurfaces.automatic([b.solid()]).pair(contact=PenaltyContact(PENALTY), **options)
+    for lower, upper in moves:
+        b.move(lower, upper)
+        b.state.commit()
+        pair.begin()
+    pair.evaluate()
+    return pair.energies()["contact"]
+
+
+@pytest.mark.mpi
+def test_what_lies_far_behind_is_no_partner():
+    """The side of a half, turned by half a turn behind the other one, faces its side, both in one plane at first."""
+    turned = (lambda x: np.array([2.5 - 2 * x[0], 1 - 2 * x[1]]), lambda x: 0 * x)
+    assert held_by_all_surfaces(make_blocks(2, 4), [turned], search=3.0) < TOUCHED
+
+
+@pytest.mark.mpi
+def test_both_flanks_of_a_ridge_are_no_partners():
+    """A flat top is raised to a ridge of 60°: from within its flanks face each other."""
+    raised = (lambda x: 0 * x, lambda x: np.array([0 * x[0], 0.87 * (1 - np.abs(2 * x[0] - 1)) * (2 * x[1] - 1)]))
+    assert held_by_all_surfaces(make_blocks(2, 2), [raised]) < TOUCHED
+
+
+@pytest.mark.mpi
+def test_flanks_of_a_crease_that_have_passed_each_other_are_partners():
+    """A flat top is folded inwards to a crease, whose flanks then pass through each other by some degrees."""
+    b = make_blocks(2, 2)
+
+    def folded(depth, over):
+        def of_top(x):
+            at_top, middle = 2 * x[1] - 1, 1 - np.abs(2 * x[0] - 1)
+            return np.array([(0.5 + over - x[0] * (1 + 2 * over)) * at_top * (1 - middle), -depth * middle * at_top])
+
+        return lambda x: 0 * x, of_top
+
+    assert held_by_all_surfaces(b, [folded(0.2, -0.3), folded(0.4, -0.02)]) < TOUCHED
+    assert held_by_all_surfaces(b, [folded(0.4, -0.02), folded(0.4, 0.02)]) > 1e-6
+
+
+# -- a crack whose faces press on each other, and on all else ---------------------------------------------------------
+
+
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_faces_of_a_closing_crack_do_not_meet_again(gdim):
+    """Pressed in register, the pair of all surfaces does nothing beside the crack."""
+    b = make_blocks(gdim, 4)
+    crack = b.crack(None)
+    pair = ContactSurfaces.automatic([b.solid()]).pair(closing=[faces_of(crack)])
+    top = [*[0.0] * (gdim - 1), lambda t: -0.02 * t]
+    supports = [*(Support(b.state, b.face(gdim - 1, 0.0), i) for i in range(gdim)), *b.drive(b.upper, top, "top")]
+    rows = history(Mechanics(b.state, [b.solid(), crack, pair], supports), 1.0, steps(0.5))
+    assert rows["crack_penetration"][-1] > 0 and rows["pair_pressed"][-1] == 0 and pair.energies()["contact"] == 0
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("pressed", [True, False], ids=["a closing crack", "an open one"])
+def test_outer_surface_on_the_face_of_a_crack(pressed):
+    """The upper half stands on its left side upon the lower one: a pressure ε g over that side, of length 1/2."""
+    b = make_blocks(2, 4)
+    crack = b.crack(None, closing=pressed)
+    options = {"closing": [faces_of(crack)]} if pressed else {}
+    pair = ContactSurfaces.automatic([b.solid()]).pair(contact=PenaltyContact(PENALTY), **options)
+    for gap in (0.05, -0.02):
+        # turned by a right angle about the origin, then lifted: the side at x = 0 lies above the crack
+        b.move(lambda x: 0 * x, lambda x, gap=gap: np.array([1.25 - x[1] - x[0], 0.5 + gap + x[0] - x[1]]))
+        pair.begin()
+        pair.evaluate()
+        b.state.commit()
+    # both surfaces feel the other one, each with half of the traction
+    assert pair.energies()["contact"] == pytest.approx(0.5 * PENALTY * 0.02**2 * 0.5, rel=1e-6)
+
+
 # -- tangents ---------------------------------------------------------------------------------------------------------
 
 
@@ -320,6 +398,11 @@ def test_refusals():
     pair = SurfacePair(b.state, *faces, young=E)
     with pytest.raises(ValueError, match=r"'crack' and pair 'pair' share .* closing=False"):
         Mechanics(b.state, [b.solid(), crack, pair], b.drive(b.lower, [0.0, 0.0]))
+    with pytest.raises(ValueError, match=r"closing.*empty where two surfaces meet"):
+        SurfacePair(b.state, *faces, young=E, closing=[faces])
+    surfaces, open_ = ContactSurfaces.automatic([b.solid()]), b.crack(None, closing=False)
+    with pytest.raises(ValueError, match=r"closing: pair 'pair' leaves 4 facets to a crack that does not press"):
+        Mechanics(b.state, [b.solid(), open_, surfaces.pair(closing=[faces])], b.drive(b.lower, [0.0, 0.0]))
     with pytest.raises(ValueError, match="bodies"):
         ContactSurfaces.automatic([])
     missing = np.array([100_000], dtype=np.int32)

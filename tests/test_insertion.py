@@ -177,9 +177,15 @@ def test_all_surfaces_may_meet():
     np.testing.assert_allclose(met["force"][-1], plain["force"][-1], rtol=0.01)
     whole = sum(len(face.facets) for face in cut.body.pairs[0].sides)
     assert whole > len(cut.body.slit) * 2 and np.abs(met["energy_closure"]).max() < 0.01
-    for option in ("sliding", "symmetric", "firm"):
-        with pytest.raises(ValueError, match="automatic"):
-            Faces(automatic=True, **{option: True})
+    with pytest.raises(ValueError, match="automatic"):
+        Faces(automatic=True, sliding=True)
+
+
+def test_all_surfaces_may_meet_beside_faces_that_are_alike():
+    """These press on each other as without it, and nothing else comes to lie on anything here: the same cut."""
+    (_, plain), (cut, met) = split(faces=Faces(symmetric=True)), split(faces=Faces(symmetric=True, automatic=True))
+    np.testing.assert_allclose(met["force"], plain["force"], rtol=1e-6)
+    assert all(crack.closing for crack in cut.body.cracks) and met["faces_pressed"].max() == 0
 
 
 def test_a_body_without_a_notch_is_entered_at_its_surface():

@@ -348,6 +348,10 @@ class Joining(Protocol):
     def facets(self) -> Sequence[NDArray[np.int32]]:
         """Local facets of each surface, ghosts included."""
 
+    @property
+    def closed_elsewhere(self) -> NDArray[np.int32]:
+        """Those whose two sides another term presses on each other."""
+
 
 class Observer(Protocol):
     """Observer of terms, which adds nothing to a balance.

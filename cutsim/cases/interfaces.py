@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-import numpy as np
-
 from cutsim.bodies.solid import Solid
 from cutsim.cases import schema_parts as schema
 from cutsim.cases.bodies import softest
@@ -81,10 +79,10 @@ def _pair(
     table: schema.Pair,
     temperature: Temperature | None,
 ) -> SurfacePair:
-    key = ("pairs", name)
+    key, closing = ("pairs", name), []
     if table.automatic:
-        closing = [crack.interior for crack in cracks.values() if crack.closing]
-        surfaces = ContactSurfaces.automatic(solids, np.concatenate(closing) if closing else None)
+        closing = [(crack.face("+"), crack.face("-")) for crack in cracks.values() if crack.closing]
+        surfaces = ContactSurfaces.automatic(solids)
         sides: list[Sequence[Face]] = [surfaces.faces, ()]
         young = surfaces.young
     else:
@@ -102,6 +100,7 @@ def _pair(
             allowed_penetration=table.allowed_penetration,
             small_sliding=table.small_sliding,
             two_pass=table.two_pass,
+            closing=closing,
             search=table.search,
             name=name,
         )

@@ -125,8 +125,8 @@ class Pair(Interface):
     Args:
         slave: The finer or softer surface: groups of outer facets, and faces of cracks such as "glue+".
         master: The other one; without it the first one may fold and meet itself.
-        automatic: Whether, in place of a slave and a master, all outer surfaces and faces of cuts may meet each other;
-            faces of cracks that press on each other themselves (``closing``) are left out.
+        automatic: Whether, in place of a slave and a master, all outer surfaces and faces of cuts may meet each other,
+            but for the two faces of a crack that press on each other themselves (``closing``).
         law: Cohesive law of a bond, which each point has with the one that it faces in the reference configuration,
             wherever they slide; by default contact only.
         small_sliding: Whether contact and friction, too, keep these partners.

@@ -49,10 +49,17 @@ def check_cracks(state: State, cracks: Sequence[Bonded], pairs: Sequence[Joining
         pairs: What joins surfaces, which may be faces of the cracks.
 
     Raises:
-        ValueError: Two cracks share a facet, or faces of a crack press on each other and are surfaces of a pair, too.
+        ValueError: Two cracks share a facet, or faces of a crack press on each other and are surfaces of a pair, too,
+            or a pair leaves this to a crack that does not.
     """
+    pressing = np.concatenate([np.empty(0, dtype=np.int32), *(c.interior for c in cracks if c.closing)])
+    for pair in pairs:
+        left = state.mesh.comm.allreduce(len(np.setdiff1d(pair.closed_elsewhere, pressing)))
+        if left:
+            raise ValueError(f"closing: pair {pair.name!r} leaves {left} facets to a crack that does not press on them")
     for crack, pair in ((c, p) for c in cracks if c.closing for p in pairs):
-        both = max(state.mesh.comm.allreduce(len(np.intersect1d(crack.interior, facets))) for facets in pair.facets)
+        own = np.setdiff1d(crack.interior, pair.closed_elsewhere)
+        both = max(state.mesh.comm.allreduce(len(np.intersect1d(own, facets))) for facets in pair.facets)
         if both:
             raise ValueError(
                 f"crack {crack.name!r} and pair {pair.name!r} share {both} facets, on which both would press: give the "

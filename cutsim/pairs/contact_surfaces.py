@@ -45,7 +45,7 @@ class ContactSurfaces:
         Args:
             bodies: The bodies; the same state belongs to all.
             without: Local facets that are left out, such as those of a crack whose faces press on each other
-                themselves (`Crack` with closing=True).
+                themselves (`Crack` with closing=True) and meet nothing else.
 
         Raises:
             ValueError: There is no body, bodies have different states, or what is left out is no facet of the mesh.

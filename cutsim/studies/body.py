@@ -47,8 +47,9 @@ class Faces:
             other, and the tool more firmly the harder it presses, since it may indent them before.
         sliding: Whether the faces slide over each other by more than a facet, as at the rim of a notch into which a
             tool with much friction is pushed. They then look for each other anew, at a higher cost.
-        automatic: Whether all surfaces of the body may meet, in place of the two faces: where a rough tool draws the
-            rim of a notch in so far that it folds, the outer surface comes to lie on itself and on the faces.
+        automatic: Whether all surfaces of the body may meet, and not only the two faces: where a rough tool draws the
+            rim of a notch in so far that it folds, or the lips of a puncture turn over, the outer surface comes to lie
+            on itself and on the faces. Faces that are alike on both sides or firm press on each other as without it.
         firm: Whether tool and faces penetrate each other as little as under a tip that indents an intact surface, and
             the faces part along the normal that they had: for an edge that goes round a body of revolution, and for a
             cut from a notch that is compared with a puncture. An edge of one element catches on the nodes then, and
@@ -71,8 +72,7 @@ class Faces:
         check_friction("friction", self.friction)
         firm = self.symmetric or self.firm
         require("sliding", self.sliding, not (self.sliding and firm), "False where both sides are alike or firm")
-        other = self.automatic and (firm or self.sliding)
-        require("automatic", self.automatic, not other, "False where faces are alike, firm or slide")
+        require("automatic", self.automatic, not (self.automatic and self.sliding), "False where faces slide")
 
     def crack(
         self,
@@ -102,7 +102,7 @@ class Faces:
 
     @property
     def _paired(self) -> bool:
-        return self.sliding or self.automatic
+        return self.sliding or (self.automatic and not (self.symmetric or self.firm))
 
     def pairs(self, cracks: Sequence[Crack], solids: Sequence[Solid]) -> tuple[SurfacePair, ...]:
         """What lets the faces of cracks that follow each other slide, those of one side as one surface. Collective.
@@ -112,7 +112,9 @@ class Faces:
             solids: The bodies, of which all surfaces may meet if the faces are `automatic`.
         """
         if self.automatic:
-            return (ContactSurfaces.automatic(solids).pair(friction=self.friction, name="faces"),)
+            closing = [(crack.face("+"), crack.face("-")) for crack in cracks if crack.closing]
+            surfaces = ContactSurfaces.automatic(solids)
+            return (surfaces.pair(friction=self.friction, closing=closing, name="faces"),)
         if not self.sliding:
             return ()
         plus, minus = ([crack.face(side) for crack in cracks] for side in _SIDES)

@@ -53,6 +53,7 @@ class RigidSurface:
         self.reference: Array = self._placed(start=True)
         self.global_nodes: Indices = np.full(triangulation.facets.shape, -1)
         self.pieces: Indices = np.full(len(triangulation.facets), -1)
+        self.cuts: Indices = np.zeros(len(triangulation.facets), dtype=np.int64)
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, at the start or the end of the step, whatever the displacement."""
