@@ -167,13 +167,6 @@ def held_by_all_surfaces(b, moves, **options):
 
 
 @pytest.mark.mpi
-def test_what_lies_far_behind_is_no_partner():
-    """The side of a half, turned by half a turn behind the other one, faces its side, both in one plane at first."""
-    turned = (lambda x: np.array([2.5 - 2 * x[0], 1 - 2 * x[1]]), lambda x: 0 * x)
-    assert held_by_all_surfaces(make_blocks(2, 4), [turned], search=3.0) < TOUCHED
-
-
-@pytest.mark.mpi
 def test_both_flanks_of_a_ridge_are_no_partners():
     """A flat top is raised to a ridge of 60°: from within its flanks face each other."""
     raised = (lambda x: 0 * x, lambda x: np.array([0 * x[0], 0.87 * (1 - np.abs(2 * x[0] - 1)) * (2 * x[1] - 1)]))

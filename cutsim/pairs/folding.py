@@ -92,23 +92,23 @@ class FoldingSearch(PartnerSearch):
     def _passed(self, hits: Hits, points: Points, nodes: tuple[Array, Array]) -> NDArray[np.bool_]:
         """Which partners are in front of their points, or behind because the points have come into the body.
 
-        They have been in front at the start of the step, or are known to be as deep; or they have been in front in the
-        beginning, as where points slide in past an edge, and are no deeper than is known of others. Two neighbours that
-        have been folded through each other look like the sharp edge between a back and its front: unless the edge has
-        been there from the beginning, it is taken for a fold if it is as sharp as hardly any element can be.
+        They have been in front in the reference configuration, or at the start of the step, or are known to be as deep.
+        Two neighbours that have been folded through each other look like the sharp edge between a back and its front:
+        unless the edge has been there from the beginning, it is taken for a fold if it is as sharp as hardly any
+        element can be.
         """
         known = self._known.committed
         rows = np.flatnonzero(hits.gap < -self._touch)
         behind = hits.some(rows)
         own = self._slave.global_nodes[behind.points // self._slave.count]
         beside = (own[:, :, None] == self._master.global_nodes[behind.facets][:, None]).any(axis=(1, 2))
-        pressed, deepest = known.met[behind.points] | ~self._own(behind), self._touch + 2 * known.deep
-        deep = np.where(pressed, deepest, self._touch)
+        pressed = known.met[behind.points] | ~self._own(behind)
+        deep = self._touch + np.where(pressed, 2 * known.deep, 0.0)
         ways = points.frames[behind.points, 0], self._outward(nodes[1])[behind.facets]
         folded = np.einsum("ni,ni->n", *ways) < FOLDED
-        # next to a sharp edge the back is nearer than any depth
         first = self._gap(self._reference, behind) >= -self._touch
+        # next to a sharp edge the back is nearer than any depth
+        entered = self._gap(self._start, behind) >= -deep
         keep = np.ones(len(hits.points), dtype=bool)
-        entered = (self._gap(self._start, behind) >= -deep) | (first & (behind.gap >= -deepest))
-        keep[rows] = np.where(beside, first & folded, entered)
+        keep[rows] = np.where(beside, first & folded, first | entered)
         return keep
