@@ -113,8 +113,11 @@ class Faces:
         """
         if self.automatic:
             closing = [(crack.face("+"), crack.face("-")) for crack in cracks if crack.closing]
-            surfaces = ContactSurfaces.automatic(solids)
-            return (surfaces.pair(friction=self.friction, closing=closing, name="faces"),)
+            options: dict[str, Any] = {"friction": self.friction, "closing": closing, "name": "faces"}
+            if closing:  # what folds is as small as the elements along the cut, and most of the surface is coarser
+                young, size = min(crack.young for crack in cracks), min(crack.normal_size for crack in cracks)
+                options["contact"] = PenaltyContact.automatic(young, size)
+            return (ContactSurfaces.automatic(solids).pair(**options),)
         if not self.sliding:
             return ()
         plus, minus = ([crack.face(side) for crack in cracks] for side in _SIDES)
