@@ -155,14 +155,15 @@ def test_in_register_the_pair_is_the_crack(gdim):
 TOUCHED = 1e-20
 
 
-def held_by_all_surfaces(b, moves, **options):
+def held_by_all_surfaces(b, moves, crack=None):
     """What the contact of all surfaces holds after some moves, each a step."""
-    pair = ContactSurfaces.automatic([b.solid()]).pair(contact=PenaltyContact(PENALTY), **options)
+    closing = [faces_of(crack)] if crack and crack.closing else ()
+    pair = ContactSurfaces.automatic([b.solid()], closing=closing).pair(contact=PenaltyContact(PENALTY))
     for lower, upper in moves:
         b.move(lower, upper)
+        pair.evaluate()
         b.state.commit()
         pair.begin()
-    pair.evaluate()
     return pair.energies()["contact"]
 
 
@@ -197,7 +198,7 @@ def test_faces_of_a_closing_crack_do_not_meet_again(gdim):
     """Pressed in register, the pair of all surfaces does nothing beside the crack."""
     b = make_blocks(gdim, 4)
     crack = b.crack(None)
-    pair = ContactSurfaces.automatic([b.solid()]).pair(closing=[faces_of(crack)])
+    pair = ContactSurfaces.automatic([b.solid()], closing=[faces_of(crack)]).pair()
     top = [*[0.0] * (gdim - 1), lambda t: -0.02 * t]
     supports = [*(Support(b.state, b.face(gdim - 1, 0.0), i) for i in range(gdim)), *b.drive(b.upper, top, "top")]
     rows = history(Mechanics(b.state, [b.solid(), crack, pair], supports), 1.0, steps(0.5))
@@ -210,16 +211,14 @@ def test_outer_surface_on_the_face_of_a_crack(pressed):
     """The upper half stands on its left side upon the lower one: a pressure ε g over that side, of length 1/2."""
     b = make_blocks(2, 4)
     crack = b.crack(None, closing=pressed)
-    options = {"closing": [faces_of(crack)]} if pressed else {}
-    pair = ContactSurfaces.automatic([b.solid()]).pair(contact=PenaltyContact(PENALTY), **options)
-    for gap in (0.05, -0.02):
-        # turned by a right angle about the origin, then lifted: the side at x = 0 lies above the crack
-        b.move(lambda x: 0 * x, lambda x, gap=gap: np.array([1.25 - x[1] - x[0], 0.5 + gap + x[0] - x[1]]))
-        pair.begin()
-        pair.evaluate()
-        b.state.commit()
+    # turned by a right angle about the origin, then lifted: the side at x = 0 lies above the crack
+    moves = [
+        (lambda x: 0 * x, lambda x, gap=gap: np.array([1.25 - x[1] - x[0], 0.5 + gap + x[0] - x[1]]))
+        for gap in (0.05, -0.02)
+    ]
     # both surfaces feel the other one, each with half of the traction
-    assert pair.energies()["contact"] == pytest.approx(0.5 * PENALTY * 0.02**2 * 0.5, rel=1e-6)
+    held = held_by_all_surfaces(b, moves, crack)
+    assert held == pytest.approx(0.5 * PENALTY * 0.02**2 * 0.5, rel=1e-6)
 
 
 # -- tangents ---------------------------------------------------------------------------------------------------------
@@ -391,11 +390,9 @@ def test_refusals():
     pair = SurfacePair(b.state, *faces, young=E)
     with pytest.raises(ValueError, match=r"'crack' and pair 'pair' share .* closing=False"):
         Mechanics(b.state, [b.solid(), crack, pair], b.drive(b.lower, [0.0, 0.0]))
-    with pytest.raises(ValueError, match=r"closing.*empty where two surfaces meet"):
-        SurfacePair(b.state, *faces, young=E, closing=[faces])
-    surfaces, open_ = ContactSurfaces.automatic([b.solid()]), b.crack(None, closing=False)
-    with pytest.raises(ValueError, match=r"closing: pair 'pair' leaves 4 facets to a crack that does not press"):
-        Mechanics(b.state, [b.solid(), open_, surfaces.pair(closing=[faces])], b.drive(b.lower, [0.0, 0.0]))
+    all_, open_ = ContactSurfaces.automatic([b.solid()], closing=[faces]).pair(), b.crack(None, closing=False)
+    with pytest.raises(ValueError, match=r"closing: pair 'pair' leaves facets to a crack that does not press"):
+        Mechanics(b.state, [b.solid(), open_, all_], b.drive(b.lower, [0.0, 0.0]))
     with pytest.raises(ValueError, match="bodies"):
         ContactSurfaces.automatic([])
     missing = np.array([100_000], dtype=np.int32)

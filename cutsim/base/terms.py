@@ -340,17 +340,15 @@ class Joining(Protocol):
 
     Attributes:
         name: Its name.
+        closed_elsewhere: Local facets of cuts whose faces another term presses on each other.
     """
 
     name: str
+    closed_elsewhere: NDArray[np.int32]
 
     @property
     def facets(self) -> Sequence[NDArray[np.int32]]:
         """Local facets of each surface, ghosts included."""
-
-    @property
-    def closed_elsewhere(self) -> NDArray[np.int32]:
-        """Those whose two sides another term presses on each other."""
 
 
 class Observer(Protocol):

@@ -79,10 +79,10 @@ def _pair(
     table: schema.Pair,
     temperature: Temperature | None,
 ) -> SurfacePair:
-    key, closing = ("pairs", name), []
+    key = ("pairs", name)
     if table.automatic:
         closing = [(crack.face("+"), crack.face("-")) for crack in cracks.values() if crack.closing]
-        surfaces = ContactSurfaces.automatic(solids)
+        surfaces = ContactSurfaces.automatic(solids, closing=closing)
         sides: list[Sequence[Face]] = [surfaces.faces, ()]
         young = surfaces.young
     else:
@@ -100,7 +100,6 @@ def _pair(
             allowed_penetration=table.allowed_penetration,
             small_sliding=table.small_sliding,
             two_pass=table.two_pass,
-            closing=closing,
             search=table.search,
             name=name,
         )

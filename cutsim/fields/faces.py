@@ -27,11 +27,14 @@ class Face:
         facets: Local facets.
         cells: Local cell of each.
         local: Number of each facet within its cell.
+        closing: Number, from 1, of the cut to whose '+' face each belongs, negative for its '-' face, if the two press
+            on each other elsewhere, as those of a `Crack` with closing=True; else 0. None for 0 throughout.
     """
 
     facets: NDArray[np.int32]
     cells: NDArray[np.int32]
     local: NDArray[np.int32]
+    closing: NDArray[np.int64] | None = None
 
     @classmethod
     @checked
@@ -131,11 +134,31 @@ class Face:
     @checked
     def joined(cls, faces: Sequence["Face"]) -> Self:
         """Several of them as one; both faces of a cut have the same facets."""
-        return cls(*(np.concatenate([getattr(f, part) for f in faces]) for part in ("facets", "cells", "local")))
+        return cls(
+            *(np.concatenate([getattr(f, part) for f in faces]) for part in ("facets", "cells", "local", "cuts"))
+        )
+
+    @property
+    def cuts(self) -> NDArray[np.int64]:
+        """Numbers of the cuts that close elsewhere, 0 for none."""
+        return np.zeros(len(self.facets), dtype=np.int64) if self.closing is None else self.closing
 
     def some(self, rows: NDArray[np.integer]) -> "Face":
         """Some of the facets, by their places."""
-        return Face(self.facets[rows], self.cells[rows], self.local[rows])
+        return Face(self.facets[rows], self.cells[rows], self.local[rows], self.cuts[rows])
+
+    def closing_as(self, cuts: Sequence[tuple["Face", "Face"]]) -> "Face":
+        """The same facets, those of some cuts with the number of the cut; both faces of each are given."""
+        found, labels = self.cuts.copy(), self._labels
+        for number, sides in enumerate(cuts, start=1):
+            for sign, side in zip((1, -1), sides, strict=True):
+                found[np.isin(labels, side._labels)] = sign * number
+        return Face(self.facets, self.cells, self.local, found)
+
+    @property
+    def _labels(self) -> NDArray[np.int64]:
+        """A number for each facet as seen from its cell, which has six facets at most."""
+        return 8 * self.cells.astype(np.int64) + self.local
 
     def in_order_of(self, facets: NDArray[np.int32]) -> "Face":
         """The same facets, none of which is there twice, in another order."""

@@ -39,13 +39,19 @@ class ContactSurfaces:
 
     @classmethod
     @checked
-    def automatic(cls, bodies: Sequence[Solid], without: NDArray[np.int32] | None = None) -> Self:
+    def automatic(
+        cls,
+        bodies: Sequence[Solid],
+        without: NDArray[np.int32] | None = None,
+        closing: Sequence[tuple[Face, Face]] = (),
+    ) -> Self:
         """The outer boundary of some bodies, and both faces of all cuts in them and between them. Collective.
 
         Args:
             bodies: The bodies; the same state belongs to all.
             without: Local facets that are left out, such as those of a crack whose faces press on each other
                 themselves (`Crack` with closing=True) and meet nothing else.
+            closing: Both faces of each cut whose faces press on each other themselves, and meet all else.
 
         Raises:
             ValueError: There is no body, bodies have different states, or what is left out is no facet of the mesh.
@@ -60,7 +66,7 @@ class ContactSurfaces:
         filled = sum_over_ranks(cell_map, filled)
         found = all_faces(state, without)
         faces = [face.some(np.flatnonzero(filled[face.cells])) for face in found]
-        there = [face for face in faces if mesh.comm.allreduce(len(face.facets))]
+        there = [face.closing_as(closing) for face in faces if mesh.comm.allreduce(len(face.facets))]
         return cls(state, tuple(there), min(body.material.young for body in bodies))
 
     def pair(self, **options: Any) -> SurfacePair:

@@ -1,6 +1,5 @@
 """Facets on the boundary of a body, outer or at a cut, and their nodes, distributed or gathered on every rank."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
@@ -19,9 +18,6 @@ from cutsim.fields.points import FacetPoints
 from cutsim.pairs.overlap import inside_body
 from cutsim.pairs.pairing import Array, FacetShape, Hits, Indices
 
-#: Both faces of a cut.
-Cut = tuple[Face, Face]
-
 
 class OuterSurface:
     """Facets of the boundary, outer or at a cut, and the nodes of the displacement on them.
@@ -29,7 +25,6 @@ class OuterSurface:
     Args:
         V: Space of a scalar or a vector, of degree 1 or 2; it is cracked along the facets of a cut.
         face: The facets, each with the cell to which it belongs.
-        closing: Cuts whose faces press on each other elsewhere.
 
     Attributes:
         face: The facets.
@@ -40,9 +35,9 @@ class OuterSurface:
         reference: Positions of the nodes of each facet in the reference configuration [length].
     """
 
-    def __init__(self, V: fem.FunctionSpace, face: Face, closing: Sequence[Cut] = ()) -> None:
+    def __init__(self, V: fem.FunctionSpace, face: Face) -> None:
         mesh = V.mesh
-        self.V, self.face, self._closing, gdim = V, face, closing, mesh.geometry.dim
+        self.V, self.face, gdim = V, face, mesh.geometry.dim
         self.owned = face.cells < mesh.topology.index_map(mesh.topology.dim).size_local
         self.shape, orders = _facet_orders(V)
         dofs = V.dofmap.list
@@ -60,14 +55,10 @@ class OuterSurface:
         mesh = self.V.mesh
         return np.asarray(mesh_pieces(mesh)[1][geometry_nodes(mesh)[self.face.cells, 0]], dtype=np.int64)
 
-    @cached_property
+    @property
     def cuts(self) -> Indices:
-        """Number, from 1, of the closing cut to whose face each facet belongs, negative on its second face; else 0."""
-        found, labels = np.zeros(len(self.face.facets), dtype=np.int64), _labels(self.face)
-        for number, sides in enumerate(self._closing, start=1):
-            for sign, side in zip((1, -1), sides, strict=True):
-                found[np.isin(labels, _labels(side))] = sign * number
-        return found
+        """Number of the cut that closes elsewhere to which each facet belongs, negative on its '-' face; else 0."""
+        return self.face.cuts
 
     @property
     def global_nodes(self) -> Indices:
@@ -95,7 +86,6 @@ class SlaveSurface(OuterSurface):
         V: As of `OuterSurface`.
         face: As of `OuterSurface`.
         points: Integration points of the facets.
-        closing: As of `OuterSurface`.
 
     Attributes:
         count: Number of points on a facet.
@@ -105,8 +95,8 @@ class SlaveSurface(OuterSurface):
         places: Places of arrays of point values, flattened over the facets.
     """
 
-    def __init__(self, V: fem.FunctionSpace, face: Face, points: FacetPoints, closing: Sequence[Cut] = ()) -> None:
-        super().__init__(V, face.in_order_of(points.facets), closing)
+    def __init__(self, V: fem.FunctionSpace, face: Face, points: FacetPoints) -> None:
+        super().__init__(V, face.in_order_of(points.facets))
         self.places, self.weighted, xi = points.flat_places, points.weights.ravel() > 0, points.xi
         self.count = xi.shape[1]
         self.values, self.derivatives = self.shape.values(xi.reshape(-1, xi.shape[-1]))
@@ -156,7 +146,7 @@ class Master(Protocol):
 
     @property
     def cuts(self) -> Indices:
-        """Number of the closing cut to whose face each facet belongs, as of `OuterSurface`."""
+        """Number of the cut that closes elsewhere to which each facet belongs, as of `OuterSurface`."""
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""
@@ -204,7 +194,7 @@ class SharedSurface:
 
     @cached_property
     def cuts(self) -> Indices:
-        """Number of the closing cut to whose face each facet belongs, as of `OuterSurface`. Collective."""
+        """Number of the cut that closes elsewhere to which each facet belongs, as of `OuterSurface`. Collective."""
         return self._shared(self._surface.cuts)
 
     def _shared(self, numbers: Indices) -> Indices:
@@ -232,12 +222,6 @@ class SharedSurface:
         cells = slave.face.cells
         cells = np.repeat(cells, len(points) // max(len(cells), 1))
         return inside_body(self._surface.V.mesh, points, cells, self._surface.face.cells)
-
-
-def _labels(face: Face) -> Indices:
-    """A number for each facet, as seen from its cell."""
-    # a cell has six facets at most
-    return 8 * face.cells.astype(np.int64) + face.local
 
 
 def normals(tangents: Array) -> Array:

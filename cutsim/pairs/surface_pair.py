@@ -55,8 +55,6 @@ class SurfacePair(Term):
         allowed_penetration: If given, Uzawa augmentation until no facet penetrates more than this, in the mean
             [length].
         two_pass: Whether each surface is slave once; one that meets itself always is.
-        closing: For a surface that meets itself: both faces of cuts, the two of which press on each other elsewhere, as
-            those of a `Crack` with closing=True. Each of them meets all else.
         search: Largest distance of a partner, on either side [length]; by default the mean size of the slave facets.
             Points that lie in the other body from the start, or come into it in a step, find theirs at any depth.
         name: Name in messages and output.
@@ -65,8 +63,8 @@ class SurfacePair(Term):
         passes: Each part of the slave against the master, and with two passes the other way round.
         signs: For each pass 1 if its points are on the slave surface, −1 if on the master.
         folding: Whether the surface meets itself.
-        closing: Both faces of cuts, the two of which press on each other elsewhere.
         sides: Slave and master surface.
+        closed_elsewhere: Local facets of cuts whose faces another term presses on each other (`Face.closing`).
         entities: Rows (cell, local facet), flattened, of the facets of both surfaces on this rank.
         contact: The contact law.
         normal_size: Mean size of the cells normal to the slave surface, the h of the penalty [length].
@@ -92,7 +90,6 @@ class SurfacePair(Term):
         allowed_penetration: float | None = None,
         small_sliding: bool = False,
         two_pass: bool = False,
-        closing: Sequence[tuple[Face, Face]] = (),
         search: float | None = None,
         name: str = "pair",
     ) -> None:
@@ -104,7 +101,6 @@ class SurfacePair(Term):
         lasting = self.folding and small_sliding
         require("small_sliding", small_sliding, not lasting, "False for a surface that meets itself")
         require("law", law, law is None or not self.folding, "None for a surface that meets itself")
-        require("closing", closing, self.folding or not closing, "empty where two surfaces meet")
         self.name, self.state, self.law = name, state, law
         slaves = _faces(state, slave_facets, "slave_facets")
         masters = [] if master_facets is None else _faces(state, master_facets, "master_facets")
@@ -116,13 +112,12 @@ class SurfacePair(Term):
             doubt_law(state.verdict, name, law, young, size, largest_extent(state.mesh))
         laws = PairLaws(law, self.contact, completed(friction, self.contact.stiffness), allowed_penetration)
         self.sides = Face.joined(slaves), Face.joined(masters or slaves)
+        self.closed_elsewhere = self.sides[0].facets[self.sides[0].cuts > 0]
         owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
         self.entities = rows([*slaves, *masters], owned).ravel()
         back = masters if two_pass else []
         self.signs = (1,) * len(slaves) + (-1,) * len(back)
-        self.closing = tuple(closing)
-        among = self.sides if back else self.sides[1:]
-        shared = [SharedSurface(OuterSurface(state.V, side, self.closing)) for side in among]
+        shared = [SharedSurface(OuterSurface(state.V, side)) for side in (self.sides if back else self.sides[1:])]
         self.passes = tuple(
             self._pass(i, face, shared[-1 if i < len(slaves) else 0], laws, small_sliding, search or size)
             for i, face in enumerate((*slaves, *back))
@@ -140,7 +135,7 @@ class SurfacePair(Term):
         # what a surface is going to meet, once it folds, is not what is near it now
         divided = partial(SegmentPoints, master=master, search=search, sliding=not small_sliding)
         points = (slave_points if self.folding else divided)(state, face, named)
-        surfaces = SlaveSurface(state.V, face, points, self.closing), master
+        surfaces = SlaveSurface(state.V, face, points), master
         lengths, bonds = (search, mean_size(state.mesh, [face], facet_size)), (laws.cohesive is not None, small_sliding)
         kinematics = _partners(state.memory, name, surfaces, lengths, bonds, folding=self.folding)
         weight = 0.5 if self.folding or -1 in self.signs else 1.0
@@ -150,11 +145,6 @@ class SurfacePair(Term):
     def facets(self) -> Sequence[NDArray[np.int32]]:
         """Local facets of slave and master, ghosts included."""
         return [side.facets for side in self.sides]
-
-    @property
-    def closed_elsewhere(self) -> NDArray[np.int32]:
-        """Those of the cuts whose faces press on each other elsewhere."""
-        return np.concatenate([np.empty(0, dtype=np.int32), *(plus.facets for plus, _ in self.closing)])
 
     @property
     def facet_energy(self) -> float:
@@ -234,8 +224,7 @@ class SurfacePair(Term):
 
     def watch(self) -> None:
         """Doubt surfaces that lie deep in each other. Collective."""
-        blend = self.contact.blend / self.normal_size
-        doubt_penetration(self.state.verdict, self.name, self.penetration(), blend)
+        doubt_penetration(self.state.verdict, self.name, self.penetration(), self.contact.blend / self.normal_size)
 
     def diagnose(self) -> str | None:
         """Say how deep the surfaces penetrate, and whether any point has a partner at all. Collective."""

@@ -113,11 +113,11 @@ class Faces:
         """
         if self.automatic:
             closing = [(crack.face("+"), crack.face("-")) for crack in cracks if crack.closing]
-            options: dict[str, Any] = {"friction": self.friction, "closing": closing, "name": "faces"}
+            options: dict[str, Any] = {"friction": self.friction, "name": "faces"}
             if closing:  # what folds is as small as the elements along the cut, and most of the surface is coarser
                 young, size = min(crack.young for crack in cracks), min(crack.normal_size for crack in cracks)
                 options["contact"] = PenaltyContact.automatic(young, size)
-            return (ContactSurfaces.automatic(solids).pair(**options),)
+            return (ContactSurfaces.automatic(solids, closing=closing).pair(**options),)
         if not self.sliding:
             return ()
         plus, minus = ([crack.face(side) for crack in cracks] for side in _SIDES)
