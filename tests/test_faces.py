@@ -168,13 +168,6 @@ def held_by_all_surfaces(b, moves, crack=None):
 
 
 @pytest.mark.mpi
-def test_both_flanks_of_a_ridge_are_no_partners():
-    """A flat top is raised to a ridge of 60°: from within its flanks face each other."""
-    raised = (lambda x: 0 * x, lambda x: np.array([0 * x[0], 0.87 * (1 - np.abs(2 * x[0] - 1)) * (2 * x[1] - 1)]))
-    assert held_by_all_surfaces(make_blocks(2, 2), [raised]) < TOUCHED
-
-
-@pytest.mark.mpi
 def test_flanks_of_a_crease_that_have_passed_each_other_are_partners():
     """A flat top is folded inwards to a crease, whose flanks then pass through each other by some degrees."""
     b = make_blocks(2, 2)

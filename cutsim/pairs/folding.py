@@ -15,8 +15,6 @@ from cutsim.pairs.search import Found, PartnerSearch, buried_for_ever
 BEHIND = 1e-6
 #: Cosine between the normals of two facets from which they cannot meet before partners are looked for anew.
 ALIKE = 0.9
-#: Cosine between the normals of two neighbours below which they may have been folded through each other: 30°.
-FOLDED = -0.866
 
 
 class FoldingSearch(PartnerSearch):
@@ -69,7 +67,7 @@ class FoldingSearch(PartnerSearch):
     def hits(self, points: Points, nodes: tuple[Array, Array]) -> Hits:
         """Where the rays of the points first meet the master; what has been passed hides what lies ahead."""
         hits = self._met(points, nodes, self._reach(nodes))
-        hits = hits.some(self._passed(hits, points, nodes))
+        hits = hits.some(self._entered(hits))
         return nearest(hits, hits.gap >= -self._touch)
 
     def _look_around(self, points: Points, nodes: tuple[Array, Array], reach: float, version: int) -> Found:
@@ -89,13 +87,10 @@ class FoldingSearch(PartnerSearch):
         """Which partners are on the body of their points."""
         return np.asarray(self._slave.pieces[hits.points // self._slave.count] == self._master.pieces[hits.facets])
 
-    def _passed(self, hits: Hits, points: Points, nodes: tuple[Array, Array]) -> NDArray[np.bool_]:
+    def _entered(self, hits: Hits) -> NDArray[np.bool_]:
         """Which partners are in front of their points, or behind because the points have come into the body.
 
         They have been in front in the reference configuration, or at the start of the step, or are known to be as deep.
-        Two neighbours that have been folded through each other look like the sharp edge between a back and its front:
-        unless the edge has been there from the beginning, it is taken for a fold if it is as sharp as hardly any
-        element can be.
         """
         known = self._known.committed
         rows = np.flatnonzero(hits.gap < -self._touch)
@@ -104,11 +99,8 @@ class FoldingSearch(PartnerSearch):
         beside = (own[:, :, None] == self._master.global_nodes[behind.facets][:, None]).any(axis=(1, 2))
         pressed = known.met[behind.points] | ~self._own(behind)
         deep = self._touch + np.where(pressed, 2 * known.deep, 0.0)
-        ways = points.frames[behind.points, 0], self._outward(nodes[1])[behind.facets]
-        folded = np.einsum("ni,ni->n", *ways) < FOLDED
-        first = self._gap(self._reference, behind) >= -self._touch
         # next to a sharp edge the back is nearer than any depth
-        entered = self._gap(self._start, behind) >= -deep
+        entered = (self._gap(self._start, behind) >= -deep) & ~beside
         keep = np.ones(len(hits.points), dtype=bool)
-        keep[rows] = np.where(beside, first & folded, first | entered)
+        keep[rows] = entered | (self._gap(self._reference, behind) >= -self._touch)
         return keep
