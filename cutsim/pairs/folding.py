@@ -78,7 +78,7 @@ class FoldingSearch(PartnerSearch):
         found = super()._look_around(points, nodes, reach, version)
         slaves, masters = found.facets
         ways = points.frames[:: self._slave.count, 0][slaves], self._outward(nodes[1])[masters]
-        sides = self._slave.cuts[slaves], self._master.cuts[masters]
+        sides = self._slave.face.cuts[slaves], self._master.cuts[masters]
         closing = (sides[0] != 0) & (sides[0] == -sides[1])
         facing = (np.einsum("ni,ni->n", *ways) < ALIKE) & ~closing
         return replace(found, facets=(slaves[facing], masters[facing]))

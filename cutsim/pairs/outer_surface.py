@@ -56,11 +56,6 @@ class OuterSurface:
         return np.asarray(mesh_pieces(mesh)[1][geometry_nodes(mesh)[self.face.cells, 0]], dtype=np.int64)
 
     @property
-    def cuts(self) -> Indices:
-        """Number of the cut that closes elsewhere to which each facet belongs, negative on its '-' face; else 0."""
-        return self.face.cuts
-
-    @property
     def global_nodes(self) -> Indices:
         """Global nodes of each facet."""
         numbers = self.V.dofmap.index_map.local_to_global(self.nodes.ravel().astype(np.int32))
@@ -146,7 +141,7 @@ class Master(Protocol):
 
     @property
     def cuts(self) -> Indices:
-        """Number of the cut that closes elsewhere to which each facet belongs, as of `OuterSurface`."""
+        """Number of the cut that closes elsewhere to which each facet belongs, as of `Face`."""
 
     def nodes(self, u: Array, *, start: bool) -> Array:
         """Current nodes of the facets, from a displacement of the local dofs, be it that at the start of the step."""
@@ -194,8 +189,8 @@ class SharedSurface:
 
     @cached_property
     def cuts(self) -> Indices:
-        """Number of the cut that closes elsewhere to which each facet belongs, as of `OuterSurface`. Collective."""
-        return self._shared(self._surface.cuts)
+        """Number of the cut that closes elsewhere to which each facet belongs, as of `Face`. Collective."""
+        return self._shared(self._surface.face.cuts)
 
     def _shared(self, numbers: Indices) -> Indices:
         """Numbers of the facets of all ranks, from those of this one. Collective."""

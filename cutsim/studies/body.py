@@ -70,8 +70,9 @@ class Faces:
 
     def __post_init__(self) -> None:
         check_friction("friction", self.friction)
-        firm = self.symmetric or self.firm
-        require("sliding", self.sliding, not (self.sliding and firm), "False where both sides are alike or firm")
+        require(
+            "sliding", self.sliding, not (self.sliding and self._pressing), "False where both sides are alike or firm"
+        )
         require("automatic", self.automatic, not (self.automatic and self.sliding), "False where faces slide")
 
     def crack(
@@ -90,7 +91,7 @@ class Faces:
             options["friction"] = self.friction
         if self.symmetric:
             require("faces.symmetric", True, not state.axisymmetric, "False in a body of revolution")
-        if self.symmetric or self.firm:
+        if self._pressing:
             smallest = global_range(state.mesh.comm, normal_size(state.mesh, facets))[0]
             firm = PenaltyContact.automatic(young, smallest, _FIRM, blend=_BLEND * smallest)
             options |= {"normal": "reference", "contact": firm}
@@ -101,8 +102,12 @@ class Faces:
         return tuple(Guide(crack) for crack in cracks) if self.symmetric else ()
 
     @property
+    def _pressing(self) -> bool:
+        return self.symmetric or self.firm
+
+    @property
     def _paired(self) -> bool:
-        return self.sliding or (self.automatic and not (self.symmetric or self.firm))
+        return self.sliding or (self.automatic and not self._pressing)
 
     def pairs(self, cracks: Sequence[Crack], solids: Sequence[Solid]) -> tuple[SurfacePair, ...]:
         """What lets the faces of cracks that follow each other slide, those of one side as one surface. Collective.
