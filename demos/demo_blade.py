@@ -46,14 +46,14 @@ friction = 0.0
 
 # ## Block
 #
-# The geometry `block` comes with cutsim.  With `sym=1` it is the half in front of a plane of symmetry.  The elements
-# along the crack resolve the tip of the blade.  A notch of 0.6 mm receives it.  The viscosity (MPa s) damps the small
-# jumps with which a crack runs from element to element.
+# The geometry `block` comes with cutsim.  With `sym=1` and `half=1` it is a quarter, mirrored in the middle of the edge
+# and in the plane of the crack.  The elements along the crack resolve the tip of the blade.  A notch of 0.6 mm
+# receives it.  The viscosity (MPa s) damps the small jumps with which a crack runs from element to element.
 
 from cutsim import cracked_block, geometry, read_geo
 
 layers, band, growth = (3, 0.6, 1.6) if quick else (6, 0.76, 1.5)
-size = dict(dim=3, sym=1, lc=edge, band=band, growth=growth, nz=layers, notch=0.6)
+size = dict(dim=3, sym=1, half=1, lc=edge, band=band, growth=growth, nz=layers, notch=0.6)
 domain = read_geo(geometry("block"), MPI.COMM_WORLD, size)
 block = cracked_block(domain, silicone, bond, viscosity=0.002)
 
@@ -93,7 +93,7 @@ result = {
 }
 recording.summary(result)
 near = (-8.0, 8.0, -4.2, 1.0, -5.05, 5.05)  # mm; the block is 60 mm long
-draw_insertion("results/blade/cut.png", cut, mirror=("z",), window=near)
+draw_insertion("results/blade/cut.png", cut, mirror=("x", "z"), window=near)
 if MPI.COMM_WORLD.rank == 0:
     print(*(f"{name}: {value:.5g}" for name, value in result.items()), sep="\n")
     labels = dict(xlabel="depth of the tip [mm]", ylabel="force [N]", title="Blade cutting of silicone")

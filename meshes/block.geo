@@ -10,6 +10,7 @@
 //
 // dim = 3: z from 0 to B, faces "front" (z = 0) and "back" (z = B). With sym = 1 only the half 0 < z < B/2 of a
 // block centred on z = 0, faces "symmetry" (z = 0) and "back" (z = B/2). With notch = 0 there is no facet "notch".
+// half = 1: only the right half of a block that is alike on both sides of the crack, whose facets then are on the boundary.
 // axis > 0 (dim = 2): meridian plane of a body of revolution about x = 0, whose crack is a cylinder of this radius; the left
 // half ends on the axis.
 // Sizes: lc along the crack down to `deep` and across it to `band`, growing from there; smaller ones, from `entry` on, at
@@ -21,6 +22,7 @@ DefineConstant[
   H      = {4.2,  Name "H"},       // thickness
   axis   = {0,    Name "axis"},    // radius of a crack about the axis of revolution, 0: a plane crack
   B      = {10.1, Name "B"},       // width, the length of the cutting edge (dim = 3)
+  half   = {0,    Name "half"},    // 1: only the right half
   sym    = {0,    Name "sym"},     // 1: half the width (dim = 3)
   notch  = {0.5,  Name "notch"},   // depth of the starting notch
   lc     = {0.2,  Name "lc"},      // largest element size along the crack and across the band
@@ -42,8 +44,8 @@ EndIf
 If (deep < 0 || deep > H || deep > 0 && deep <= notch || entry < 0)
   Error("deep = %g must be 0 or lie in (notch = %g, H = %g], entry = %g must be at least 0", deep, notch, H, entry);
 EndIf
-If (axis < 0 || axis > 0 && (dim == 3 || axis <= band))
-  Error("axis = %g must be 0, or with dim = 2 larger than band = %g", axis, band);
+If (axis < 0 || axis > 0 && (dim == 3 || axis <= band || half))
+  Error("axis = %g must be 0, or with dim = 2 and half = 0 larger than band = %g", axis, band);
 EndIf
 
 deepest = deep > 0 ? deep : H;
@@ -68,7 +70,7 @@ lines[] += {crack[1]};
 
 fine = band;
 entry = mouth;
-For side In {-1:1:2}
+For side In {half ? 1 : -1:1:2}
   length = side < 0 && axis > 0 ? axis : Lx;
   Call FromMouth;
   Extrude {side * length, 0, 0} { Curve{lines[]}; Layers{layers[], ends[]}; Recombine; }
@@ -77,17 +79,19 @@ depth = sym ? B / 2 : B;
 Call Thicken;
 
 e = 1e-6 * H;
-near = axis > 0 ? 0 : -Lx;
+near = axis > 0 || half ? 0 : -Lx;
 far = axis + Lx;
-name = "left";      box[] = {near, axis, -H, 0};       Call Cells;
 name = "right";     box[] = {axis, far, -H, 0};        Call Cells;
 name = "crack";     box[] = {axis, axis, -H, -notch};  Call Facets;
-name = "top_left";  box[] = {near, axis, 0, 0};        Call Facets;
 name = "top_right"; box[] = {axis, far, 0, 0};         Call Facets;
 name = "bottom";    box[] = {near, far, -H, -H};       Call Facets;
 name = "far_right"; box[] = {far, far, -H, 0};         Call Facets;
-If (axis == 0)
-  name = "far_left"; box[] = {-Lx, -Lx, -H, 0}; Call Facets;
+If (!half)
+  name = "left";     box[] = {near, axis, -H, 0}; Call Cells;
+  name = "top_left"; box[] = {near, axis, 0, 0};  Call Facets;
+  If (axis == 0)
+    name = "far_left"; box[] = {-Lx, -Lx, -H, 0}; Call Facets;
+  EndIf
 EndIf
 If (notch > 0)
   name = "notch"; box[] = {axis, axis, -notch, 0}; Call Facets;

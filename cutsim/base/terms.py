@@ -319,7 +319,7 @@ class Interface(Protocol):
 
 @runtime_checkable
 class Bonded(Protocol):
-    """A term whose law acts on interior facets.
+    """A term whose law acts between the sides of facets.
 
     Attributes:
         name: Its name.
@@ -330,8 +330,12 @@ class Bonded(Protocol):
     closing: bool
 
     @property
-    def interior(self) -> NDArray[np.int32]:
-        """Local interior facets, ghosts included."""
+    def facets(self) -> NDArray[np.int32]:
+        """Local facets, ghosts included."""
+
+    @property
+    def meshed(self) -> Sequence[Any]:
+        """Those of the two faces that are meshed, as `cutsim.fields.faces.Face`. Collective."""
 
 
 @runtime_checkable

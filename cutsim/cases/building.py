@@ -139,11 +139,12 @@ def _insertion(domain: Domain) -> Simulation:
 
 
 def _mirror(cut: Insertion) -> tuple[str, ...]:
-    """Plane of symmetry of an insertion into half a body, if an axis is normal to it."""
-    edge = cut.frame.edge
-    if edge is None or cut.symmetry_factor == 1:
-        return ()
-    return tuple(axis for axis, along in zip("xyz", edge, strict=True) if abs(along) == 1)
+    """Planes of symmetry of an insertion into a part of a body, if axes are normal to them."""
+    frame = cut.frame
+    planes = [frame.normal] if cut.body.mirrored else []
+    if cut.halved and frame.edge is not None:
+        planes.append(frame.edge)
+    return tuple(axis for n in planes for axis, along in zip("xyz", n, strict=False) if abs(along) == 1)
 
 
 def _general(domain: Domain) -> Simulation:

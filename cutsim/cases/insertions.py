@@ -32,8 +32,8 @@ def inserted(domain: Domain, mechanics: Mapping[str, Any]) -> tuple[Insertion, T
     """
     table = domain.tables.insertion
     assert table is not None
-    _check_fixture(domain)
     body, value = _layered(domain) if domain.tables.layers else _cracked(domain)
+    _check_fixture(domain, body)
     tool = domain.tables.tools[table.tool]
     shape = tool.made
     if not isinstance(shape, Insertable):
@@ -53,13 +53,13 @@ def inserted(domain: Domain, mechanics: Mapping[str, Any]) -> tuple[Insertion, T
     return cut, value
 
 
-def _check_fixture(domain: Domain) -> None:
+def _check_fixture(domain: Domain, body: CrackedBody) -> None:
     """Refuse names that are no groups of the mesh."""
     assert domain.tables.insertion is not None
     fixture = domain.tables.insertion.fixture
     key = (_KEY, "fixture")
     named: Mapping[str, Sequence[str]] = {
-        "top": fixture.top,
+        "top": fixture.tops(body),
         "plate": (fixture.plate,),
         "walls": fixture.walls,
         "ends": fixture.ends,

@@ -45,19 +45,20 @@ def check_cracks(state: State, cracks: Sequence[Bonded], pairs: Sequence[Joining
 
     Args:
         state: Displacement and time.
-        cracks: What acts on interior facets.
+        cracks: What acts between the sides of facets.
         pairs: What joins surfaces, which may be faces of the cracks.
 
     Raises:
         ValueError: Two cracks share a facet, or faces of a crack press on each other and are surfaces of a pair, too,
             or a pair leaves this to a crack that does not.
     """
-    pressing = np.concatenate([np.empty(0, dtype=np.int32), *(c.interior for c in cracks if c.closing)])
+    inner = [crack for crack in cracks if len(crack.meshed) == 2]  # faces in a plane of symmetry also meet others
+    pressing = np.concatenate([np.empty(0, dtype=np.int32), *(c.facets for c in inner if c.closing)])
     for pair in pairs:
         if state.mesh.comm.allreduce(len(np.setdiff1d(pair.closed_elsewhere, pressing))):
             raise ValueError(f"closing: pair {pair.name!r} leaves facets to a crack that does not press on them")
-    for crack, pair in ((c, p) for c in cracks if c.closing for p in pairs):
-        own = np.setdiff1d(crack.interior, pair.closed_elsewhere)
+    for crack, pair in ((c, p) for c in inner if c.closing for p in pairs):
+        own = np.setdiff1d(crack.facets, pair.closed_elsewhere)
         both = max(state.mesh.comm.allreduce(len(np.intersect1d(own, facets))) for facets in pair.facets)
         if both:
             raise ValueError(
@@ -65,12 +66,12 @@ def check_cracks(state: State, cracks: Sequence[Bonded], pairs: Sequence[Joining
                 "crack closing=False, or leave its faces out of the pair"
             )
     for one, other in combinations(cracks, 2):
-        both = state.mesh.comm.allreduce(len(np.intersect1d(one.interior, other.interior)))
+        both = state.mesh.comm.allreduce(len(np.intersect1d(one.facets, other.facets)))
         if both:
             raise ValueError(f"cracks {one.name!r} and {other.name!r} share {both} facets: each facet has one law")
-    if cracks:
-        facets = np.unique(np.concatenate([c.interior for c in cracks])).astype(np.int32)
-        doubt_gaps(state.mesh, facets, " and ".join(c.name for c in cracks), state.verdict)
+    if inner:
+        facets = np.unique(np.concatenate([c.facets for c in inner])).astype(np.int32)
+        doubt_gaps(state.mesh, facets, " and ".join(c.name for c in inner), state.verdict)
 
 
 def doubt_gaps(mesh: Mesh, facets: NDArray[np.int32], name: str, verdict: Verdict) -> None:

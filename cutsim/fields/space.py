@@ -13,7 +13,7 @@ import basix
 import numpy as np
 from dolfinx import cpp, fem, la
 from dolfinx.common import IndexMap, timed
-from dolfinx.mesh import Mesh, compute_midpoints
+from dolfinx.mesh import Mesh, compute_midpoints, exterior_facet_indices
 from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
@@ -133,6 +133,16 @@ def crack_measure_entities(mesh: Mesh, facets: Facets, plus: NDArray[np.int32] |
         first = _along(mesh, cracked, cells, np.asarray(plus, dtype=np.float64))
     rows = np.stack([cells, local_facets], axis=2)
     return np.where(first[:, None, None], rows, rows[:, ::-1]).ravel()
+
+
+def on_boundary(mesh: Mesh, facets: NDArray[np.int32]) -> bool:
+    """Whether facets lie on the outer boundary, all of them, and are not twins of others on it. Collective."""
+    outer = np.zeros(_facet_map(mesh).size_local + _facet_map(mesh).num_ghosts, dtype=np.int32)
+    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+    outer[exterior_facet_indices(mesh.topology)] = 1
+    outer = sum_over_ranks(_facet_map(mesh), outer)
+    inner = mesh.comm.allreduce(int((outer[np.asarray(facets, dtype=np.int32)] == 0).sum()))
+    return inner == 0 and not split_along(mesh, np.asarray(facets, dtype=np.int32))
 
 
 def locate_dofs(V: fem.FunctionSpace, dim: int, entities: NDArray[np.int32]) -> NDArray[np.int32]:

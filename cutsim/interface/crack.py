@@ -10,19 +10,16 @@ from typing import Literal
 
 import numpy as np
 import ufl
-from dolfinx.mesh import Mesh
 from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
 from cutsim.base.compat import EntityMaps
-from cutsim.base.kinematics import Expr, displacement_jump
+from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
-from cutsim.fields.crack_checks import check_cracked
 from cutsim.fields.faces import Face
-from cutsim.fields.points import FacetPoints, Surface, Values
+from cutsim.fields.points import Surface, Values
 from cutsim.fields.sizes import facet_size, largest_extent, normal_size
-from cutsim.fields.space import crack_measure_entities
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
@@ -32,7 +29,9 @@ from cutsim.interface.crack_viscosity import CrackViscosity
 from cutsim.interface.doubts import doubt_law, doubt_penetration
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.path_measure import PathMeasure
+from cutsim.interface.point_fields import PointFields
 from cutsim.interface.rubbing import AnyFriction, check_friction
+from cutsim.interface.sides import MirroredSide, sides_of
 from cutsim.interface.viscous import ViscousBond
 
 #: Fields of a crack for output.
@@ -43,13 +42,15 @@ _ROUNDING = 1e-9
 _CURE = "a stiffer contact is needed or, where they slide past each other, symmetric or sliding faces"
 
 
-class Crack(Term):
+class Crack(PointFields):
     """Modified contact on a set of interior facets of a cracked space.
 
     Args:
         state: Displacement (on a space that is cracked along the facets) and time.
-        facets: Local interior facets, ghosts included.
-        plus: The side called '+': its local cells (ghosts included) or a direction e with n⁺·e > 0.
+        facets: Local interior facets, ghosts included; with plus=None facets of the outer boundary.
+        plus: The side called '+': its local cells (ghosts included) or a direction e with n⁺·e > 0. None if only this
+            side is meshed: the facets lie in a plane of symmetry, in which the other one is its image, and all
+            energies are those of the side that is meshed.
         law: Cohesive law; None for a crack that is already broken, with contact only.
         young: Young's modulus of the softer neighbour, for the automatic penalty and the mesh check [stress].
         name: Name in messages and output.
@@ -62,14 +63,15 @@ class Crack(Term):
 
     Attributes:
         young: Young's modulus of the softer neighbour [stress].
+        entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank; without
+            the last two in a plane of symmetry.
         points: Its integration points, with the facets in the order of all per-facet arrays.
         history: What they remember.
-        faces: Kinematics and tractions of the faces at a displacement.
+        faces: Its sides, meshed or not, and kinematics and tractions of the faces at a displacement.
         path_measure: Gives what the bond loses in a step, see `cutsim.base.terms.Dissipating`.
         friction: Friction of the faces, or None.
         closing: Whether closed faces press on each other.
         viscosity: Viscosity of the bond, or None.
-        entities: Rows (cell⁺, local facet⁺, cell⁻, local facet⁻), flattened, of the facets owned by this rank.
         normal_size: Mean size of the neighbouring cells across the crack, the h of the penalty [length].
 
     Raises:
@@ -83,7 +85,7 @@ class Crack(Term):
         self,
         state: State,
         facets: NDArray[np.int32],
-        plus: NDArray[np.int32] | tuple[float, ...],
+        plus: NDArray[np.int32] | tuple[float, ...] | None,
         law: CohesiveLaw | None = None,
         *,
         young: float,
@@ -99,23 +101,20 @@ class Crack(Term):
         check_friction("friction", friction)
         for parameter, value in {"friction": friction, "allowed_penetration": allowed_penetration}.items():
             require(parameter, value, closing or not value, "None with closing=False: a pair of the faces takes it")
+        require("friction", friction, plus is not None or not friction, "None: a face does not slide on its image")
         self.name, self.state, self.law, self.young = name, state, law, young
         self._allowed_penetration = allowed_penetration
-        self.entities = crack_measure_entities(state.mesh, facets, plus)
-        check_cracked(state.V, facets, name)
-        self.points = FacetPoints(
-            state.mesh, np.asarray(facets, dtype=np.int32), state.measures.interior(self.entities), interior=True
-        )
+        sides = sides_of(state, np.asarray(facets, dtype=np.int32), plus, name, current=normal == "current")
+        self.points, self.entities = sides.points, sides.entities
         self.normal_size = self.points.mean(normal_size(state.mesh, self.points.facets))
         self.contact = contact or PenaltyContact.automatic(young, self.normal_size)
         if law is not None:
             doubt_law(state.verdict, name, law, young, self.size, largest_extent(state.mesh))
         self.history = InterfaceHistory(state.memory, name, self.points, law)
+        self.closing, augmented = closing, allowed_penetration is not None
         pressing = self.contact if closing else None
-        options = {"current": normal == "current", "augmented": allowed_penetration is not None}
-        self.closing = closing
-        self.faces = CrackFaces(state, self.points, self.history, law, pressing, **options)
-        self.path_measure = PathMeasure(state, self.points, self.faces, self.history)
+        self.faces = CrackFaces(state, sides, self.history, law, pressing, augmented=augmented)
+        self.path_measure = PathMeasure(state, sides, self.faces, self.history)
         self.friction = CrackFriction(self, friction) if friction else None
         self.viscosity = CrackViscosity(self, law) if isinstance(law, ViscousBond) else None
 
@@ -123,6 +122,11 @@ class Crack(Term):
     def size(self) -> float:
         """Median size of the facets along the crack, whose end may be coarser [length]. Collective."""
         return self.points.median(facet_size(self.state.mesh, self.points.facets))
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether only one side is meshed, and the other one is its image."""
+        return isinstance(self.faces.sides, MirroredSide)
 
     @property
     def companions(self) -> Sequence[Term]:
@@ -137,24 +141,21 @@ class Crack(Term):
         return self.points.entity_maps
 
     @property
-    def submesh(self) -> Mesh:
-        """Mesh of the facets."""
-        return self.points.submesh
-
-    @property
     def facet_fields(self) -> tuple[str, ...]:
         """Fields for output, averaged over each facet; none without a law."""
         return () if self.law is None else FIELDS
 
     @property
-    def interior(self) -> NDArray[np.int32]:
-        """Local interior facets of the crack, ghosts included."""
-        return self.points.facets
+    def meshed(self) -> tuple[Face, ...]:
+        """Its faces, '+' first; in a plane of symmetry this one alone. Collective."""
+        return self.faces.sides.meshed
 
     @property
     def facet_energy(self) -> float:
         """Energy that breaks a facet of mean size in opening; 0 without a law."""
-        return self.law.toughness * self.points.mean(self.points.weights.sum(axis=1)) if self.law is not None else 0.0
+        if self.law is None:
+            return 0.0
+        return self.faces.sides.share * self.law.toughness * self.points.mean(self.points.weights.sum(axis=1))
 
     def surface(self, side: Literal["+", "-"]) -> Surface:
         """One face of the crack, which a tool can touch. Collective."""
@@ -162,13 +163,13 @@ class Crack(Term):
 
     def face(self, side: Literal["+", "-"]) -> Face:
         """One face of the crack, for a pair of surfaces. Collective."""
-        return Face.of_rows(self.state.mesh, self.entities, side)
+        return self.faces.sides.face(side)
 
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ T·(v⁻ − v⁺) dΓ₀ of cohesive traction and contact pressure."""
         response = self.faces.response(self.state.u)
         traction = response.cohesive - response.pressure * response.normal
-        return ufl.inner(traction, displacement_jump(v)) * self.points.measure
+        return self.faces.virtual_work(traction, v)
 
     # -- history --------------------------------------------------------------------------------------------------
 
@@ -185,7 +186,7 @@ class Crack(Term):
 
     def energies(self) -> dict[str, float]:
         """Recoverable and dissipated part of the cohesive work, and the energy of the contact penalty. Collective."""
-        return self.history.energies()
+        return {name: self.faces.sides.share * energy for name, energy in self.history.energies().items()}
 
     def damage_increment(self) -> float:
         """Largest growth of damage at a point in the trial step. Collective."""
@@ -238,7 +239,3 @@ class Crack(Term):
     def dissipation(self) -> Values:
         """Fracture dissipation of the trial step at the integration points [energy per reference area]."""
         return self.history.dissipation()
-
-    def facet_mean(self, name: str) -> Values:
-        """Mean over each local crack facet of a point quantity; arguments as `point_values`."""
-        return self.points.facet_mean(self.point_values(name))

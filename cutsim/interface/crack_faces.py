@@ -6,14 +6,15 @@ import ufl
 from dolfinx import default_scalar_type, fem
 
 from cutsim.base.functions import larger
-from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
+from cutsim.base.kinematics import Expr
 from cutsim.base.parameters import with_constants
-from cutsim.fields.points import FacetPoints, Values
+from cutsim.fields.points import Values
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.modified_contact import InterfaceResponse, respond
+from cutsim.interface.sides import Sides
 
 
 @dataclass(frozen=True)
@@ -40,27 +41,28 @@ class CrackFaces:
 
     Args:
         state: Displacement and time.
-        points: Integration points of the crack.
-        history: What they remember.
+        sides: Sides of the crack.
+        history: What its points remember.
         law: Cohesive law, None for a crack that is already broken.
         contact: Contact law of the closed crack, None if its faces do not press on each other.
-        current: Whether the normal is that of the current mid-surface; else it is that of the reference configuration.
         augmented: Whether a multiplier makes up for penetration.
+
+    Attributes:
+        sides: The sides.
     """
 
     def __init__(
         self,
         state: State,
-        points: FacetPoints,
+        sides: Sides,
         history: InterfaceHistory,
         law: CohesiveLaw | None,
         contact: PenaltyContact | None,
         *,
-        current: bool,
         augmented: bool,
     ) -> None:
-        self._state, self._points, self._history = state, points, history
-        self._current, self._augmented = current, augmented
+        self.sides, self._state, self._history, self._augmented = sides, state, history, augmented
+        self._points = points = sides.points
         self._law = None if law is None else with_constants(state.mesh, law)
         self._contact = None if contact is None else with_constants(state.mesh, contact)
         self._s = fem.Constant(state.mesh, default_scalar_type(1.0))
@@ -68,20 +70,21 @@ class CrackFaces:
 
     def response(self, u: Expr) -> CrackResponse:
         """The law at a displacement, restricted to the crack."""
-        N = ufl.FacetNormal(self._state.mesh)
-        n = midsurface_normal(u, N) if self._current else N("+")
-        jump = displacement_jump(u)
+        n, jump = self.sides.normal(u), self.sides.jump(u)
         gap = ufl.dot(jump, n)
         slide = jump - gap * n
         multiplier = self._points.at(self._history.multiplier) if self._augmented else 0.0
-        fade = facing(u, N) if self._current else ufl.as_ufl(1.0)
         memory = self._points.at(self._history.secants)
-        r = respond(self._law, self._contact, gap, slide, memory, multiplier, fade)
+        r = respond(self._law, self._contact, gap, slide, memory, multiplier, self.sides.facing(u))
         return CrackResponse(**vars(r), jump=jump, opening=gap, slide=slide, cohesive=r.tension * n + r.shear, normal=n)
 
     def frame(self, u: Expr) -> tuple[Expr, ...]:
         """Unit tangents of the mid-surface that turn with it: one in 2-D, two in 3-D."""
-        return surface_frame(u, self._state.mesh, self.response(u).normal, current=self._current)
+        return self.sides.frame(u)
+
+    def virtual_work(self, traction: Expr, v: Expr) -> ufl.Form:
+        """Virtual work ∫ t·(v⁻ − v⁺) dΓ₀ of a traction that acts as t on the '+' face, as far as that is meshed."""
+        return self.sides.share * ufl.dot(traction, self.sides.jump(v)) * self._points.measure
 
     def values(self, s: float) -> dict[str, Values]:
         """Values at the points for the fraction s of the step's displacement increment."""
@@ -92,7 +95,7 @@ class CrackFaces:
         """What is known at each point, at the fraction s of the step's displacement increment."""
         u_s = self._state.u_old + self._s * (self._state.u - self._state.u_old)
         r = self.response(u_s)
-        increment = displacement_jump(self._state.u) - displacement_jump(self._state.u_old)
+        increment = self.sides.jump(self._state.u) - self.sides.jump(self._state.u_old)
         return {
             "secants": ufl.as_vector([*r.secants]),
             "jump": ufl.as_vector([r.opening, *(ufl.dot(r.jump, a) for a in self.frame(u_s))]),

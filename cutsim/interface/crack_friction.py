@@ -6,7 +6,7 @@ import ufl
 
 from cutsim.base.checks import require
 from cutsim.base.compat import EntityMaps
-from cutsim.base.kinematics import Expr, displacement_jump
+from cutsim.base.kinematics import Expr
 from cutsim.base.signatures import checked
 from cutsim.base.terms import Term
 from cutsim.fields.points import FacetPoints, Values
@@ -75,7 +75,7 @@ class CrackFriction(Term):
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ t·(v⁻ − v⁺) dΓ₀; the traction acts as t on the '+' face."""
         traction = sum(self.slip.traction[i] * a for i, a in enumerate(self._frame))
-        return self._share * ufl.dot(traction, displacement_jump(v)) * self.crack.points.measure
+        return self.crack.faces.virtual_work(self._share * traction, v)
 
     def augment(self) -> bool:
         """Uzawa step if a facet that sticks slides by more than is allowed. Collective."""

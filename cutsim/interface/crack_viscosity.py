@@ -4,7 +4,7 @@ import ufl
 
 from cutsim.base.assembly import Array, nodal_forces
 from cutsim.base.compat import EntityMaps, form
-from cutsim.base.kinematics import Expr, displacement_jump
+from cutsim.base.kinematics import Expr
 from cutsim.base.terms import Term
 from cutsim.interface.crack_friction import Faced
 from cutsim.interface.viscous import ViscousBond, ViscousHistory
@@ -37,7 +37,7 @@ class CrackViscosity(Term):
     def residual(self, v: Expr) -> ufl.Form:
         """Virtual work ∫ t·(v⁻ − v⁺) dΓ₀; the traction acts as t on the '+' face."""
         traction = sum(self._history.traction[i] * a for i, a in enumerate(self._axes))
-        return ufl.dot(traction, displacement_jump(v)) * self.crack.points.measure
+        return self.crack.faces.virtual_work(traction, v)
 
     def evaluate(self) -> None:
         """Dissipation of the trial step. Collective."""
@@ -54,4 +54,4 @@ class CrackViscosity(Term):
     @property
     def viscous_work(self) -> float:
         """The same [energy]."""
-        return self._history.dissipated()
+        return self.crack.faces.sides.share * self._history.dissipated()

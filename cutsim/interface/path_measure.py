@@ -9,10 +9,10 @@ from cutsim.base.assembly import Array, integrate
 from cutsim.base.compat import form
 from cutsim.base.functions import positive_part
 from cutsim.base.kinematics import Expr
-from cutsim.fields.points import FacetPoints
 from cutsim.fields.state import State
 from cutsim.interface.crack_faces import CrackFaces
 from cutsim.interface.history import InterfaceHistory
+from cutsim.interface.sides import Sides
 
 
 def step_loss(memory: Expr, secants: tuple[Expr, Expr], before: tuple[Expr, Expr], now: tuple[Expr, Expr]) -> Expr:
@@ -37,21 +37,21 @@ class PathMeasure:
 
     Args:
         state: Displacement and time.
-        points: Integration points of the crack.
+        sides: Sides of the crack.
         faces: Law between its faces.
         history: Smallest secants at the start of the step.
     """
 
-    def __init__(self, state: State, points: FacetPoints, faces: CrackFaces, history: InterfaceHistory) -> None:
-        self._state, self._points, self._faces, self._history = state, points, faces, history
+    def __init__(self, state: State, sides: Sides, faces: CrackFaces, history: InterfaceHistory) -> None:
+        self._state, self._sides, self._faces, self._history = state, sides, faces, history
 
     @cached_property
     def _forms(self) -> tuple[fem.Form, fem.Form]:
         """Loss and derivative: compiled when a path is followed for the first time, which most runs never do."""
-        state, points = self._state, self._points
+        state, points = self._state, self._sides.points
         before, now = self._faces.response(state.u_old), self._faces.response(state.u)
         jumps = ((r.opening, r.sliding) for r in (before, now))
-        loss = step_loss(points.at(self._history.secants), now.secants, *jumps) * points.measure
+        loss = self._sides.share * step_loss(points.at(self._history.secants), now.secants, *jumps) * points.measure
         slope = ufl.derivative(loss, state.u, ufl.TestFunction(state.V))
         return form(loss, entity_maps=points.entity_maps), form(slope, entity_maps=points.entity_maps)
 

@@ -59,7 +59,7 @@ def gather_grid(
 def gather_facets(
     u: fem.Function, facets: NDArray[np.int32], damage: NDArray[np.float64]
 ) -> pyvista.UnstructuredGrid | None:
-    """Both faces of a crack with their damage on the first rank. Collective.
+    """The faces of a crack that are meshed, with their damage on the first rank. Collective.
 
     Args:
         u: Displacement on the cracked space, ghosts up to date. Faces of degree 2 are drawn straight.
@@ -67,8 +67,8 @@ def gather_facets(
         damage: Damage of each of these facets, in [0, 1].
 
     Returns:
-        The reference grid, each facet twice, with ``damage`` and the ``middle`` of the cell behind it per
-        facet and the displacement ``u`` per point on the first rank; None on the others, and where pyvista is
+        The reference grid, each facet for each of its cells, with ``damage`` and the ``middle`` of the cell behind it
+        per facet and the displacement ``u`` per point on the first rank; None on the others, and where pyvista is
         missing.
 
     Raises:
@@ -78,14 +78,14 @@ def gather_facets(
     mesh = space.mesh
     _require_rows(mesh.comm, "damage", len(damage), len(facets))
     owned = np.asarray(facets) < mesh.topology.index_map(mesh.topology.dim - 1).size_local
-    dofs, cells = _faces(space, np.asarray(facets)[owned])
+    dofs, cells, rows = _faces(space, np.asarray(facets)[owned])
     nodes = space.tabulate_dof_coordinates()
     values = u.x.array.reshape(-1, space.dofmap.bs)[dofs.ravel()]
     kind = {1: 1, 2: 3, 3: 5, 4: 9}[dofs.shape[1]]  # VTK: vertex, line, triangle, quadrilateral
     first = mesh.comm.exscan(dofs.size) or 0
     table = first + np.arange(dofs.size).reshape(dofs.shape)
     middle = nodes[space.dofmap.list[cells]].mean(axis=1)
-    data = {"damage": np.tile(np.asarray(damage)[owned], 2), "middle": middle}
+    data = {"damage": np.asarray(damage)[owned][rows], "middle": middle}
     return _assemble(mesh.comm, table, np.full(len(table), kind), nodes[dofs.ravel()], {"u": values}, data)
 
 
@@ -159,8 +159,10 @@ def _require_rows(comm: MPI.Comm, name: str, rows: int, expected: int) -> None:
     require(f"length of {name}", rows, not wrong, f"{expected}, on {wrong} ranks it is not")
 
 
-def _faces(space: fem.FunctionSpace, facets: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Vertex dofs of interior facets, in VTK's order, and the cells behind: one side, then the other."""
+def _faces(
+    space: fem.FunctionSpace, facets: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int64]]:
+    """Vertex dofs of facets in VTK's order, the cells behind, and the places of the facets, for each of their cells."""
     topology, layout = space.mesh.topology, space.dofmap.dof_layout
     tdim = topology.dim
     topology.create_connectivity(tdim - 1, tdim)
@@ -170,11 +172,13 @@ def _faces(space: fem.FunctionSpace, facets: NDArray[np.int32]) -> tuple[NDArray
     if vertices.shape[1] == 4:
         vertices = vertices[:, [0, 1, 3, 2]]
     corners = np.array([layout.entity_dofs(0, v)[0] for v in range(vertices.max() + 1)])[vertices]
-    starts = to_cells.offsets[facets]
-    cells = np.concatenate((to_cells.array[starts], to_cells.array[starts + 1]))
+    starts, ends = to_cells.offsets[facets], to_cells.offsets[facets + 1]
+    second = np.flatnonzero(ends - starts == 2)
+    rows = np.concatenate((np.arange(len(facets)), second))
+    cells = np.concatenate((to_cells.array[starts], to_cells.array[starts[second] + 1]))
     numbers = to_facets.array.reshape(-1, len(vertices))[cells]
-    local = np.argmax(numbers == np.tile(facets, 2)[:, None], axis=1)
-    return space.dofmap.list[cells[:, None], corners[local]], cells
+    local = np.argmax(numbers == facets[rows, None], axis=1)
+    return space.dofmap.list[cells[:, None], corners[local]], cells, rows
 
 
 def _assemble(

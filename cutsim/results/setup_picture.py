@@ -60,7 +60,7 @@ def draw_setup(
     place = fem.Function(fem.functionspace(state.mesh, ("Lagrange", 1, (state.mesh.geometry.dim,))))
     grid = gather_grid(place, {"part": part_numbers(state, solids)})
     cracks = {
-        crack.name: gather_facets(state.u, crack.interior, np.zeros(len(crack.interior)))
+        crack.name: gather_facets(state.u, crack.facets, np.zeros(len(crack.facets)))
         for crack in offering(problem.terms, Bonded)
     }
     marks = {name: _gathered(state, nodes) for name, nodes in _marked(problem, supports).items()}

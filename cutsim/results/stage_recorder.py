@@ -139,7 +139,7 @@ class _Scene:
             return None
         u = self._state.u
         grid = gather_grid(u, {"stress": self._stress(), "part": self._part})
-        faces = [gather_facets(u, crack.interior, crack.facet_mean("damage")) for crack in self._cracks]
+        faces = [gather_facets(u, crack.facets, crack.facet_mean("damage")) for crack in self._cracks]
         if grid is None:
             return None
         try:

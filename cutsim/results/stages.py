@@ -23,6 +23,8 @@ Floats = NDArray[np.float32]
 
 # distance from a plane of symmetry that is none, over the size of the body
 _FLAT = 1e-6
+# part of the width of a tool that is little, such as the clearance of half a blade
+_LITTLE = 0.1
 # what a stage consists of
 _SKINS = ("body", "cracks", "tools")
 _ABOUT = ("time", "parts", "flat", "right", "up", "mirror")
@@ -76,10 +78,11 @@ class Skin:
     def mirrored(self, plane: str) -> Self:
         """The part joined with its image in a plane through the origin, given by the axis normal to it.
 
-        Triangles in the plane, which are inside the whole, are left out.
+        Triangles in the plane, which are inside the whole, are left out, but for those of a crack that is open there.
         """
         axis, count = "xyz".index(plane), len(self.points)
-        seam = np.abs(self.points[:, axis]) <= _FLAT * np.abs(self.points).max(initial=0.0)
+        off = np.abs([self.points[:, axis], self.displacement[:, axis]]).max(axis=0)
+        seam = off <= _FLAT * np.abs(self.points).max(initial=0.0)
         images = np.where(seam, np.arange(count), count - 1 + np.cumsum(~seam))
         inside = seam[self.cells].all(axis=1) & (self.cells.shape[1] == 3)
         cells = self.cells[~inside]
@@ -92,6 +95,12 @@ class Skin:
             cells=np.vstack([cells, images[cells][:, ::-1]]).astype(np.int32),
             values=values,
         )
+
+    def beside(self, plane: str) -> bool:
+        """Whether the part lies on one side of a plane through the origin, but for a little of it."""
+        places = self.deformed[:, "xyz".index(plane)]
+        low, high = -places.min(initial=0.0), places.max(initial=0.0)
+        return bool(min(low, high) <= _LITTLE * (low + high))
 
     def _doubled(self, array: Floats, nodes: NDArray[np.bool_], cells: NDArray[np.bool_]) -> Floats:
         """Values of a part and its image, which has some of the nodes; both have some of the cells."""
@@ -129,10 +138,11 @@ class Stage:
     mirror: tuple[str, ...] = ()
 
     def whole(self) -> Self:
-        """The stage with the images of body and cracks in the planes of symmetry; tools are whole in any case."""
+        """The stage with the images of body and cracks in the planes of symmetry, and of tools on one side of them."""
         stage = replace(self, mirror=())
         for plane in self.mirror:
-            stage = replace(stage, body=stage.body.mirrored(plane), cracks=stage.cracks.mirrored(plane))
+            tools = stage.tools.mirrored(plane) if stage.tools.beside(plane) else stage.tools
+            stage = replace(stage, body=stage.body.mirrored(plane), cracks=stage.cracks.mirrored(plane), tools=tools)
         return stage
 
     def write(self, path: Path) -> None:

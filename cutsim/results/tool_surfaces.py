@@ -179,7 +179,8 @@ def _pointed(shape: Pointed, pose: Pose, box: Array) -> Any:
         turn = (-np.pi / 2, np.pi / 2) if shape.side else (0.0, 2 * np.pi)
         return pose.placed(revolved(outline, np.zeros(3), ((shape.side or 1) * lateral, -push), turn=turn))
     if shape.side:
-        outline = outline[shape.side * outline[:, 0] >= 0]
+        half, top = outline[shape.side * outline[:, 0] >= 0], outline[:, 1].max()  # it goes from the tip to the right
+        outline = np.insert(half, len(half) if shape.side > 0 else 1, [0.0, top], axis=0)
     if flat:
         return pose.placed(prism(outline, np.zeros(3), (lateral, -push)))
     beside, given = _BESIDE * (high - low), getattr(shape, "edge_length", None)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
+from dolfinx.fem import functionspace
 from numpy.typing import NDArray
 
 from cutsim.base.checks import count, nonnegative, require, require_number
@@ -13,7 +14,7 @@ from cutsim.base.terms import Term
 from cutsim.bodies.solid import Solid
 from cutsim.fields.meshing import TaggedMesh
 from cutsim.fields.sizes import global_range, normal_size
-from cutsim.fields.space import cracked_space
+from cutsim.fields.space import cracked_space, on_boundary
 from cutsim.fields.state import State
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
@@ -29,6 +30,7 @@ Facets = NDArray[np.int32]
 
 # contact of the faces of a crack under a tip that indents it: penalty over E/h, and blend over h
 _FIRM, _BLEND = 50.0, 0.02
+_IMAGE = "{} for a crack on the outer boundary, a plane of symmetry: a face does not slide on its image"
 _SIDES: tuple[Literal["+", "-"], ...] = ("+", "-")
 
 
@@ -41,6 +43,9 @@ class Faces:
     the crack out along itself, up to a right angle. If both sides are alike, the faces part along the normal of the
     plane, however they turn, and their middle is kept in it by a `Guide`; and their contact is firmer.  Faces that a
     rubbing tool draws along beside each other slide: a pair of surfaces carries their pressure.
+
+    Of a body that is alike on both sides one is enough: a crack on the outer boundary of the mesh lies in a plane of
+    symmetry, and its face meets its image. Unknowns and time are halved, and nothing can slip off to one side.
 
     Args:
         symmetric: Whether body and tool are alike on both sides of a plane crack. The faces then press firmly on each
@@ -85,9 +90,13 @@ class Faces:
         young: float,
         name: str = "crack",
     ) -> Crack:
-        """A crack with such faces; arguments as for `Crack`. Collective."""
-        options: dict[str, Any] = {"young": young, "name": name, "closing": not self._paired}
-        if not self._paired:
+        """A crack with such faces; arguments as for `Crack`. On the outer boundary it meets its image. Collective."""
+        mirrored = on_boundary(state.mesh, facets)
+        if mirrored:
+            require("faces.sliding", self.sliding, not self.sliding, _IMAGE.format("False"))
+            require("faces.friction", self.friction, self.automatic or not self.friction, _IMAGE.format("None"))
+        options: dict[str, Any] = {"young": young, "name": name, "closing": mirrored or not self._paired}
+        if not (mirrored or self._paired):
             options["friction"] = self.friction
         if self.symmetric:
             require("faces.symmetric", True, not state.axisymmetric, "False in a body of revolution")
@@ -95,11 +104,11 @@ class Faces:
             smallest = global_range(state.mesh.comm, normal_size(state.mesh, facets))[0]
             firm = PenaltyContact.automatic(young, smallest, _FIRM, blend=_BLEND * smallest)
             options |= {"normal": "reference", "contact": firm}
-        return Crack(state, facets, plus, law, **options)
+        return Crack(state, facets, None if mirrored else plus, law, **options)
 
     def guides(self, cracks: Sequence[Crack]) -> tuple[Guide, ...]:
-        """What keeps the middle of some cracks in their plane."""
-        return tuple(Guide(crack) for crack in cracks) if self.symmetric else ()
+        """What keeps the middle of some cracks in their plane, where both sides are meshed."""
+        return tuple(Guide(crack) for crack in cracks if not crack.mirrored) if self.symmetric else ()
 
     @property
     def _pressing(self) -> bool:
@@ -117,9 +126,10 @@ class Faces:
             solids: The bodies, of which all surfaces may meet if the faces are `automatic`.
         """
         if self.automatic:
-            closing = [(crack.face("+"), crack.face("-")) for crack in cracks if crack.closing]
+            alone = [crack for crack in cracks if crack.closing]
+            closing = [(crack.face("+"), crack.face("-")) for crack in alone if not crack.mirrored]
             options: dict[str, Any] = {"friction": self.friction, "name": "faces"}
-            if closing:  # what folds is as small as the elements along the cut, and most of the surface is coarser
+            if alone:  # what folds is as small as the elements along the cut, and most of the surface is coarser
                 young, size = min(crack.young for crack in cracks), min(crack.normal_size for crack in cracks)
                 options["contact"] = PenaltyContact.automatic(young, size)
             return (ContactSurfaces.automatic(solids, closing=closing).pair(**options),)
@@ -177,6 +187,11 @@ class CrackedBody:
     def slit(self) -> Facets:
         """Local facets of the whole crack plane, notch and bonds."""
         return np.unique(np.concatenate([self.mouth, *(crack.points.facets for crack in self.cracks)])).astype(np.int32)
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether only one side of the crack is meshed, and the other one is its image."""
+        return self.cracks[0].mirrored
 
     def columns(self, columns: Columns) -> Columns:
         """What a body has to say for the history, none by itself. Collective."""
@@ -238,7 +253,10 @@ def cracked_block(
 
 
 def cracked_state(domain: TaggedMesh, facets: Sequence[Facets], degree: int, axisymmetric: bool) -> State:
-    """Displacement that may jump across some facets. Collective."""
+    """Displacement that may jump across some facets, but for those on the outer boundary. Collective."""
     mesh = domain.mesh
-    space = cracked_space(mesh, ("Lagrange", degree, (mesh.geometry.dim,)), facets)
-    return State(space, axisymmetric=axisymmetric)
+    element = ("Lagrange", degree, (mesh.geometry.dim,))
+    inner = [part for part in facets if not on_boundary(mesh, part)]
+    return State(
+        cracked_space(mesh, element, inner) if inner else functionspace(mesh, element), axisymmetric=axisymmetric
+    )

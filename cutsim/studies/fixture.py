@@ -31,7 +31,8 @@ class Fixture:
     line, in its middle. A body that is held at its ends may be cut through.
 
     Args:
-        top: Facets of the surface beside the '−' and the '+' face of the crack.
+        top: Facets of the surface beside the '−' and the '+' face of the crack; of a crack in a plane of symmetry only
+            the second are used.
         plate: Facets on the plate, on the far side of the body.
         resting: Whether the body rests on the plate and may lift off; if not, the plate holds it.
         friction: Friction of a resting body on the plate, a law, or the coefficient of Coulomb's; None for none.
@@ -70,12 +71,16 @@ class Fixture:
             ValueError: With the name, and those that the mesh has.
         """
         for parameter, names in (
-            ("top", self.top),
+            ("top", self.tops(body)),
             ("plate", (self.plate,)),
             ("walls", self.walls),
             ("ends", self.ends),
         ):
             _facets(body, f"fixture.{parameter}", names)
+
+    def tops(self, body: CrackedBody) -> tuple[str, ...]:
+        """The surface beside the faces of the crack that are meshed."""
+        return self.top[1:] if body.mirrored else self.top
 
     def halved(self, body: CrackedBody) -> bool:
         """Whether the mesh is that of a half, with a plane of symmetry."""

@@ -63,9 +63,8 @@ class Frame:
 
     def side(self, crack: Crack) -> int:
         """On which side of the crack plane the '+' face of a crack has its body: that of ±normal. Collective."""
-        mesh, cells = crack.state.mesh, crack.entities.reshape(-1, 4)[:, ::2]
-        plus, minus = (compute_midpoints(mesh, mesh.topology.dim, np.ascontiguousarray(side)) for side in cells.T)
-        arms = (plus - minus).reshape(-1, 3)[:, : len(self.normal)]
+        mesh, cells = crack.state.mesh, crack.face("+").cells
+        arms = compute_midpoints(mesh, mesh.topology.dim, cells).reshape(-1, 3)[:, : len(self.normal)] - self.origin
         return 1 if mesh.comm.allreduce(float((arms @ self.normal).sum())) > 0 else -1
 
     @classmethod

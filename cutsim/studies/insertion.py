@@ -60,7 +60,7 @@ class Insertion:
         mechanics: The problem to run.
         carriage: What a machine drives along the push, with all of the tool on it; None for a tool that follows its
             motion.
-        symmetry_factor: Factor from what is meshed to the whole body, 2 with a plane of symmetry.
+        symmetry_factor: Factor from what is meshed to the whole body, 2 for each plane of symmetry.
     """
 
     body: CrackedBody
@@ -115,7 +115,7 @@ class Insertion:
         _check_notch(body, tool, frame, notch)
         motion = Motion.of(drive, tool, notch, np.inf if fixture.ends else frame.height)
         doubt_units(body.state.verdict, _kind(tool), tool, frame.height)
-        factor = 2.0 if fixture.halved(body) else 1.0
+        factor = (2.0 if fixture.halved(body) else 1.0) * (2.0 if body.mirrored else 1.0)
         carriage = None
         if machine is not None:
             driven, release = motion.driven(machine, frame, factor)
@@ -138,6 +138,11 @@ class Insertion:
     def state(self) -> State:
         """Displacement and time."""
         return self.body.state
+
+    @property
+    def halved(self) -> bool:
+        """Whether a plane of symmetry halves body and tool along the edge."""
+        return self.symmetry_factor == (4 if self.body.mirrored else 2)
 
     @property
     def depth(self) -> float:
@@ -167,15 +172,16 @@ class Insertion:
         says of itself, such as the energies of its layers, follows.
         """
         factor, kind = self.symmetry_factor, self.state.facet_measure
+        whole = factor / 2 if self.body.mirrored else factor  # its plane does not halve the crack in it
         force = -factor * float(sum(contact.force() for contact in self.contacts) @ self.frame.push)
         reaction = factor * self.reaction()
         rows: Columns = {
             "depth": (self.depth, "length"),
             "force": (force, "force"),
             "imbalance": (abs(reaction - force) / abs(force) if force else 0.0, "one"),
-            "cut": (factor * sum(area.spent() for area in self.areas), kind),
-            "front": (factor * sum(area.swept() for area in self.areas), kind),
-            "spent": (factor * sum(c.points.integral(c.point_values("spent")) for c in self.body.cracks), kind),
+            "cut": (whole * sum(area.spent() for area in self.areas), kind),
+            "front": (whole * sum(area.swept() for area in self.areas), kind),
+            "spent": (whole * sum(c.points.integral(c.point_values("spent")) for c in self.body.cracks), kind),
         }
         for part in PARTS:
             rows[f"{part}_force"] = (factor * self.parts.force(part), "force")
@@ -221,7 +227,7 @@ def _contacts(
     plus = frame.side(body.cracks[0])
     faces: list[tuple[Literal["+", "-"], int, str]] = [("+", plus, top[1])]
     whole = on_axis(body, tool)
-    if not whole:  # else the thread does not meet the tool
+    if not (whole or body.mirrored):  # else the thread does not meet the tool, or the other side is an image
         faces.append(("-", -plus, top[0]))
     intact = body.notch is None and body.state.axisymmetric
     firm = body.faces.firm or intact

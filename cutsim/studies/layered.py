@@ -145,7 +145,10 @@ class LayeredBlock(CrackedBody):
             spent = crack.point_values("dissipated")
             for layer in self.layers_of(crack):
                 within = np.isin(crack.points.facets, self.domain.facets(_group(layer)))
-                rows[f"{layer.name}_fracture"] = (crack.points.integral(spent * within[:, None]), "energy")
+                rows[f"{layer.name}_fracture"] = (
+                    crack.faces.sides.share * crack.points.integral(spent * within[:, None]),
+                    "energy",
+                )
         return rows
 
 

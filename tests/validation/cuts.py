@@ -4,6 +4,8 @@
 # with the correction for the compressed strip below the blade that the program `steady_cut` derives.  Here four half
 # angles and three toughnesses are tried in plane strain on two meshes, and a slice.
 #
+# One side of the strip is meshed: the crack lies in a plane of symmetry.
+#
 # - *Angles*: 10°, 15°, 20°, 30°; toughness 0.05, 0.1, 0.2 N/mm, with a strength in proportion, so that the opening at
 #   the strength and with it the meshes are the same.  What is compared is the toughness by the mean force,
 #   $F(1 + \varepsilon/2)/(1 + \varepsilon)$ with $\varepsilon = F(1-\nu^2)/(EA)$.
@@ -40,7 +42,7 @@ STEADY = (2.0, 4.0)  # depths of the tip between which the cut is steady [mm]
 
 def split(angle: float, toughness: float, size: float) -> tuple[float, int]:
     """Toughness by the mean force of a steady cut [N/mm], and the number of unknowns."""
-    sizes = {"dim": 2, "Lx": 1.0, "H": 6.5, "lc": size, "band": 0.3, "growth": 1.6, "notch": 0.5}
+    sizes = {"dim": 2, "Lx": 1.0, "H": 6.5, "lc": size, "band": 0.3, "growth": 1.6, "notch": 0.5, "half": 1}
     domain = read_geo(geometry("block"), COMM, sizes, gdim=2)
     body = cracked_block(
         domain, SILICONE, Exponential(strength=3 * toughness, toughness=toughness), viscosity=VISCOSITY
@@ -51,7 +53,7 @@ def split(angle: float, toughness: float, size: float) -> tuple[float, int]:
         cut.mechanics,
         cut.time_of(STEADY[1]),
         StepControl(first=0.02, largest=0.1),
-        lambda report: rows.append((cut.depth, -sum(contact.force() for contact in cut.contacts) @ cut.frame.push)),
+        lambda report: rows.append((cut.depth, cut.columns(report.columns)["force"][0])),
     )
     depth, force = np.array(rows).T
     steady = depth >= STEADY[0]
@@ -79,6 +81,7 @@ TOUGHNESS, WIDTH, HALF_ANGLE, MU = 0.1, 0.2, np.radians(20), 0.2
 def steady_forces(ratio: float, friction: float | None, size: float = 0.2) -> np.ndarray:
     """Forces along push and slice, and friction work per push, over the width; walls hold the strip along the edge."""
     sizes = {"dim": 3, "Lx": 1.0, "H": 4.5, "lc": size, "band": 0.3, "growth": 1.6, "notch": 0.5, "B": WIDTH, "nz": 1}
+    sizes |= {"half": 1}
     domain = read_geo(geometry("block"), COMM, sizes, gdim=3)
     body = cracked_block(domain, SILICONE, Exponential(strength=0.3, toughness=TOUGHNESS), viscosity=VISCOSITY)
     blade = Blade(HALF_ANGLE, 0.2, 0.5, (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
@@ -87,8 +90,8 @@ def steady_forces(ratio: float, friction: float | None, size: float = 0.2) -> np
     rows = []
 
     def record(report) -> None:
-        force = -sum(contact.force() for contact in cut.contacts)
-        rubbed = report.columns["energy_friction"][0]
+        force = -cut.symmetry_factor * sum(contact.force() for contact in cut.contacts)
+        rubbed = cut.symmetry_factor * report.columns["energy_friction"][0]
         rows.append((cut.depth, force @ cut.frame.push, force @ cut.frame.edge, rubbed))
 
     run(cut.mechanics, cut.time_of(2.8), StepControl(first=0.02, largest=0.1), record)

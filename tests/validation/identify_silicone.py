@@ -99,7 +99,8 @@ PUNCHED = {0.412096: 0.437557, 0.43174: 0.446646, 0.35874: 0.270886}
 
 # ## The cut
 #
-# The cut is in plane strain and gives force per width against the depth of the tip.  Friction acts from the beginning,
+# The cut is in plane strain and gives force per width against the depth of the tip.  Both halves are alike, and one of
+# them is meshed.  Friction acts from the beginning,
 # toughness once the crack runs, so that one curve contains both.  The cut with noise of 1 % of the largest force is the
 # measurement.  A fit that starts 30 and 50 % away finds toughness and friction.
 
@@ -115,7 +116,7 @@ class Specimen:
     notch: float = 0.6
 
 
-BLOCK = {"dim": 2, "Lx": 3.0, "H": 4.5, "lc": 0.15, "band": 0.45, "growth": 1.6, "notch": 0.6}
+BLOCK = {"dim": 2, "Lx": 3.0, "H": 4.5, "lc": 0.15, "band": 0.45, "growth": 1.6, "notch": 0.6, "half": 1}
 TALL = {True: Specimen(BLOCK, 3.5, 0.15), False: Specimen(BLOCK | {"H": 6.0}, 5.0, 0.1)}
 TRUE = {"toughness": 0.3, "friction": 0.1}
 GUESS = {"toughness": 0.4, "friction": 0.15}

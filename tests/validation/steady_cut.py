@@ -48,7 +48,8 @@ MESH = geometry("block")
 
 # ## The strip
 #
-# Half thickness and width [mm], a soft silicone, and a bond whose process zone several elements resolve.
+# Half thickness and width [mm], a soft silicone, and a bond whose process zone several elements resolve.  The crack
+# lies in a plane of symmetry, so that one side of the strip is meshed.
 
 HALF, WIDTH, HEIGHT, NOTCH = 1.0, 1.0, 6.5, 0.5
 SILICONE, VISCOSITY = NeoHookean(0.777, 0.45), 2e-4  # MPa, MPa s at 1 mm/s
@@ -88,8 +89,9 @@ class Strip:
         return 2 * HALF * self.width * (E if self.dim == 3 else E / (1 - nu**2))
 
     def build(self, turning_depth: float | None) -> Insertion:
-        """Strip and blade; a half of the strip in space, where its middle plane is one of symmetry. Collective."""
+        """One side of the strip and blade; in space a half of that, in front of its middle plane. Collective."""
         sizes = {"dim": self.dim, "Lx": HALF, "H": HEIGHT, "lc": self.size, "band": 0.3, "growth": 1.6, "notch": NOTCH}
+        sizes |= {"half": 1}
         if self.dim == 3:
             sizes |= {"B": WIDTH, "sym": 1, "nz": self.layers}
         forward, lateral = (0.0, -1.0, 0.0)[: self.dim], (1.0, 0.0, 0.0)[: self.dim]

@@ -1,0 +1,208 @@
+"""Sides of a crack: both are meshed, or one of them and its image in a plane of symmetry (docs/theory.md §1, 3)."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+import ufl
+from dolfinx.mesh import Mesh, compute_midpoints
+from mpi4py import MPI
+from numpy.typing import NDArray
+from ufl.geometry import FacetJacobian
+
+from cutsim.base.arrays import Array
+from cutsim.base.checks import require
+from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
+from cutsim.fields.crack_checks import check_cracked
+from cutsim.fields.faces import Face, rows
+from cutsim.fields.points import FacetPoints
+from cutsim.fields.space import crack_measure_entities
+from cutsim.fields.state import State
+from cutsim.fields.twins import facet_nodes
+
+Facets = NDArray[np.int32]
+# distance from a plane that is none, over the size of the facets together
+_FLAT = 1e-6
+
+
+class Sides(ABC):
+    """Sides of a crack, '+' and '−'.
+
+    Args:
+        state: Displacement and time.
+        points: Integration points of the crack.
+        entities: Rows (cell, local facet) of the sides that are meshed, flattened, of the facets owned by this rank.
+
+    Attributes:
+        points: The points.
+        entities: The rows.
+        share: Part of the energy of the crack that belongs to what is meshed.
+    """
+
+    share = 1.0
+
+    def __init__(self, state: State, points: FacetPoints, entities: NDArray[np.int32]) -> None:
+        self._state, self.points, self.entities = state, points, entities
+
+    @property
+    @abstractmethod
+    def meshed(self) -> tuple[Face, ...]:
+        """The faces that are meshed, '+' first. Collective."""
+
+    @abstractmethod
+    def jump(self, u: Expr) -> Expr:
+        """Jump u⁻ − u⁺ of a displacement, for use on the crack."""
+
+    @abstractmethod
+    def normal(self, u: Expr) -> Expr:
+        """Unit normal at a displacement, from '+' to '−'."""
+
+    @abstractmethod
+    def facing(self, u: Expr) -> Expr:
+        """Whether the faces face each other, see `cutsim.base.kinematics.facing`."""
+
+    @abstractmethod
+    def frame(self, u: Expr) -> tuple[Expr, ...]:
+        """Unit tangents that turn with the crack, one in 2-D, two in 3-D."""
+
+    def face(self, side: Literal["+", "-"]) -> Face:
+        """One of the faces. Collective.
+
+        Raises:
+            ValueError: It is not meshed.
+        """
+        require("side", side, side in ("+", "-")[: len(self.meshed)], "'+', or '-' where both sides are meshed")
+        return self.meshed["+-".index(side)]
+
+
+class TwoSides(Sides):
+    """Both sides of facets within the mesh.
+
+    Args:
+        state: Displacement, on a space that is cracked along the facets, and time.
+        facets: Local interior facets, ghosts included.
+        plus: The side called '+', as for `cutsim.Crack`.
+        name: Name of the crack.
+        current: Whether the normal is that of the current mid-surface; else it is that of the reference configuration.
+
+    Raises:
+        ValueError: The facets are not a crack of the mesh.
+    """
+
+    def __init__(
+        self, state: State, facets: Facets, plus: Facets | Sequence[float], name: str, *, current: bool
+    ) -> None:
+        entities = crack_measure_entities(state.mesh, facets, plus)
+        check_cracked(state.V, facets, name)
+        measure = state.measures.interior(entities)
+        super().__init__(state, FacetPoints(state.mesh, facets, measure, interior=True), entities)
+        self._current, self._N = current, ufl.FacetNormal(state.mesh)
+
+    @property
+    def meshed(self) -> tuple[Face, ...]:
+        """Both faces. Collective."""
+        mesh = self._state.mesh
+        return Face.of_rows(mesh, self.entities, "+"), Face.of_rows(mesh, self.entities, "-")
+
+    def jump(self, u: Expr) -> Expr:
+        """Jump u⁻ − u⁺ of a displacement."""
+        return displacement_jump(u)
+
+    def normal(self, u: Expr) -> Expr:
+        """Unit normal of the mid-surface."""
+        return midsurface_normal(u, self._N) if self._current else self._N("+")
+
+    def facing(self, u: Expr) -> Expr:
+        """Whether the faces face each other; in the reference configuration they do."""
+        return facing(u, self._N) if self._current else ufl.as_ufl(1.0)
+
+    def frame(self, u: Expr) -> tuple[Expr, ...]:
+        """Unit tangents of the mid-surface."""
+        return surface_frame(u, self._state.mesh, self.normal(u), current=self._current)
+
+
+class MirroredSide(Sides):
+    """The '+' side of a crack in a plane of symmetry; the other one is its image.
+
+    With the normal N of the plane the image of u is u − 2 (u·N) N: the jump is −2 (u·N) N, an opening without slide.
+    Half of the work on it is done on the side that is meshed.
+
+    Args:
+        state: Displacement and time.
+        facets: Local facets of the outer boundary, ghosts included, in one plane.
+
+    Raises:
+        ValueError: The facets are not on the outer boundary, or in no plane of symmetry.
+    """
+
+    share = 0.5
+
+    def __init__(self, state: State, facets: Facets) -> None:
+        self._face = Face.outer(state.mesh, facets)
+        require(
+            "facets", f"{len(facets)} on one rank", in_plane_of_symmetry(state, self._face), "in a plane of symmetry"
+        )
+        points = FacetPoints(state.mesh, self._face.facets, state.measures.face(self._face), interior=False)
+        owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
+        super().__init__(state, points, rows([self._face], owned).ravel())
+        self._N = ufl.FacetNormal(state.mesh)
+
+    @property
+    def meshed(self) -> tuple[Face, ...]:
+        """The '+' face."""
+        return (self._face,)
+
+    def jump(self, u: Expr) -> Expr:
+        """Jump −2 (u·N) N from a displacement to that of the image."""
+        return -2 * ufl.dot(u, self._N) * self._N
+
+    def normal(self, u: Expr) -> Expr:
+        """Normal of the plane."""
+        return self._N
+
+    def facing(self, u: Expr) -> Expr:
+        """One: what leaves the plane is in front of its image."""
+        return ufl.as_ufl(1.0)
+
+    def frame(self, u: Expr) -> tuple[Expr, ...]:
+        """Unit tangents of the plane."""
+        n = self._N
+        if len(n) == 2:
+            return (ufl.as_vector([-n[1], n[0]]),)
+        edge = FacetJacobian(self._state.mesh)[:, 0]
+        first = edge / ufl.sqrt(ufl.dot(edge, edge))
+        return first, ufl.cross(n, first)
+
+
+def sides_of(state: State, facets: Facets, plus: Facets | Sequence[float] | None, name: str, *, current: bool) -> Sides:
+    """The sides of a crack; arguments as for `TwoSides`, plus=None if one of them is the image of the other."""
+    return MirroredSide(state, facets) if plus is None else TwoSides(state, facets, plus, name, current=current)
+
+
+def in_plane_of_symmetry(state: State, face: Face) -> bool:
+    """Whether facets lie in one plane with the body on one side, in which it can be mirrored. Collective.
+
+    The plane of a body of revolution is normal to its axis.
+    """
+    mesh, comm = state.mesh, state.mesh.comm
+    gdim = mesh.geometry.dim
+    x = mesh.geometry.x[facet_nodes(mesh, face.facets), :gdim]
+    x = x - comm.allreduce(x.sum(axis=0)) / comm.allreduce(len(x))
+    normal = np.linalg.eigh(comm.allreduce(x.T @ x))[1][:, 0]
+    size = comm.allreduce(np.abs(x).max(initial=0.0), MPI.MAX)
+    off = comm.allreduce(np.abs(x @ normal).max(initial=0.0), MPI.MAX)
+    ahead = (_inward(mesh, face) @ normal > 0).sum()
+    ahead, there = comm.allreduce(np.array([ahead, len(face.cells)]))
+    upright = not state.axisymmetric or abs(normal[0]) <= _FLAT
+    return bool(off <= _FLAT * size and ahead in (0, there) and upright)
+
+
+def _inward(mesh: Mesh, face: Face) -> Array:
+    """From the middles of facets to those of their cells [length]."""
+    (cells, facets), gdim = (face.cells, face.facets), mesh.geometry.dim
+    of_cells, of_facets = (
+        compute_midpoints(mesh, mesh.topology.dim - i, entities).reshape(-1, 3)
+        for i, entities in enumerate((cells, facets))
+    )
+    return np.asarray((of_cells - of_facets)[:, :gdim])
