@@ -10,6 +10,7 @@
 //
 // The plane x = 0 is the crack, but for the notch |z| < slit, -notch < y < 0. Faces "symmetry" (z = 0), "back" (z = B);
 // with whole = 1 "front" (z = -B) in place of the first, for a needle whose two halves along the crack differ.
+// half = 1: only the right half of a block that is alike on both sides of the crack, whose facets then are on the boundary.
 // With notch = 0 there is no facet "notch", and `slit` is the half width of the fine part.
 // Sizes: lc down to `deep`, out to `band` and along z to `slit`, growing from there.
 Include "common.geo";
@@ -17,6 +18,7 @@ DefineConstant[
   L      = {12,  Name "L"},       // length of each half
   B      = {10,  Name "B"},       // half the width
   whole  = {0,   Name "whole"},   // 1: with the half behind z = 0
+  half   = {0,   Name "half"},    // 1: only the right half
   H      = {10,  Name "H"},       // height
   notch  = {1,   Name "notch"},   // depth of the starting notch
   slit   = {1.4, Name "slit"},    // half its width
@@ -57,13 +59,13 @@ length = L;
 fine = band;
 entry = mouth;
 Call FromMouth;
-For side In {-1:1:2}
+For side In {half ? 1 : -1:1:2}
   Extrude {side * L, 0, 0} { Curve{lines[]}; Layers{layers[], ends[]}; Recombine; }
 EndFor
 
 sections[] = Surface{:};
-For half In {0:both}
-  way = 1 - 2 * half;
+For back In {0:both}
+  way = 1 - 2 * back;
   length = slit;
   fine = slit;
   Call FromMouth;
@@ -79,11 +81,14 @@ depth = B;
 behind = both * B;
 dim = 3;
 e = 1e-6 * H;
-name = "left";      box[] = {-L, 0, -H, 0};  Call Cells;
-name = "right";     box[] = {0, L, -H, 0};   Call Cells;
-name = "top_left";  box[] = {-L, 0, 0, 0};   Call Facets;
-name = "top_right"; box[] = {0, L, 0, 0};    Call Facets;
-name = "bottom";    box[] = {-L, L, -H, -H}; Call Facets;
+near = half ? 0 : -L;
+name = "right";     box[] = {0, L, -H, 0};      Call Cells;
+name = "top_right"; box[] = {0, L, 0, 0};       Call Facets;
+name = "bottom";    box[] = {near, L, -H, -H};  Call Facets;
+If (!half)
+  name = "left";     box[] = {-L, 0, -H, 0};  Call Cells;
+  name = "top_left"; box[] = {-L, 0, 0, 0};   Call Facets;
+EndIf
 If (both)
   sections[] = Surface In BoundingBox{-L - e, -H - e, -B - e, L + e, e, -B + e};
 EndIf

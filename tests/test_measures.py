@@ -23,7 +23,7 @@ WIDE = {
     "commands.sweep.command": 10,
     "analysis.mechanics.Mechanics.__init__": 10,
     "interface.crack.Crack.__init__": 11,
-    "fields.laminate.laminate": 11,
+    "fields.laminate.laminate": 12,
     "studies.body.cracked_block": 9,
     "tools.tool_contact.ToolContact.__init__": 9,
     "tools.triangulated_tool.TriangulatedTool.__init__": 10,

@@ -29,7 +29,7 @@ Entities = NDArray[np.int32]
 # what entities of a codimension are called
 _KINDS = {0: "cells", 1: "facets"}
 # parameters of `laminate` that are whole numbers
-_COUNTS = ("least", "rows")
+_COUNTS = ("least", "rows", "half")
 # of coordinates, over the size of the mesh
 _ROUNDING = 1e-9
 

@@ -36,6 +36,7 @@ def laminate(
     width: float | None = None,
     rows: int = 4,
     thread: float | None = None,
+    half: int = 0,
 ) -> TaggedMesh:
     """Mesh a block of layers, quadrilaterals or hexahedra. Collective.
 
@@ -60,6 +61,8 @@ def laminate(
         width: Width along z of a block in 3-D, from z = 0 on; None for the plane [length].
         rows: Elements across the width.
         thread: Radius of the thread about the axis of a body of revolution, which has no width; None for a block.
+        half: 1 for the right half of a block that is alike on both sides of the crack, whose facets then are on the
+            outer boundary; there are no facets "top_left" and "far_left". 0 for both halves.
 
     Raises:
         ValueError: On all ranks, if a number is outside its range or a layer has no name of its own.
@@ -79,9 +82,11 @@ def laminate(
     require_number("rows", rows, count(1))
     require_number("thread", thread, positive.or_none)
     require("width", width, width is None or thread is None, "None for a body of revolution")
-    half = _graded(length, size, band, entry)
+    require("half", half, half == 0 or half == 1 and thread is None, "0 or 1, and 0 for a body of revolution")
+    right = _graded(length, size, band, entry)
     bounds = -np.concatenate([[0.0], np.cumsum(list(layers.values()))])
-    across = np.concatenate([-half[:0:-1], half]) if thread is None else np.append(0.0, thread + half)
+    left = -right[:0:-1] if not half else []
+    across = np.concatenate([left, right]) if thread is None else np.append(0.0, thread + right)
     lines = [across, _down(bounds, size, notch, least, entry)[::-1]]
     if width is not None:
         lines.append(np.linspace(0.0, width, rows + 1))
@@ -152,12 +157,13 @@ def _markers(
             facets[f"crack_{name}"] = both(middle, between(1, low, min(top, -notch)))
     if notch:
         facets["notch"] = both(middle, between(1, -notch, 0.0))
-    facets["top_left"] = both(between(1, 0.0, 0.0), between(0, near, crack))
+    if near < crack:
+        facets["top_left"] = both(between(1, 0.0, 0.0), between(0, near, crack))
     facets["top_right"] = both(between(1, 0.0, 0.0), between(0, crack, far))
     facets["bottom"], facets["far_right"] = between(1, bottom, bottom), between(0, far, far)
     if near < 0:
         facets["far_left"] = between(0, near, near)
-    else:
+    elif crack > 0:
         cells["left"], cells["right"] = between(0, near, crack), between(0, crack, far)
     if width is not None:
         facets["front"], facets["back"] = between(2, 0.0, 0.0), between(2, width, width)

@@ -39,7 +39,8 @@ class Fixture:
         symmetry: Facets in the plane of symmetry that halves body and tool; used if the mesh has this group.
         walls: Facets that are held along the edge of the tool: a body between two of them is in plane strain.
         ends: Facets at the far ends, one group on either side of the crack plane, which are held along its normal; they
-            are free if there are none. In a body of revolution they are one group, its rim.
+            are free if there are none. In a body of revolution, or if the crack lies in a plane of symmetry, they are
+            one group.
         drawn: Way by which each end is drawn outwards while the tool comes into the notch [length].
         thread: Cells of the thread in a body of revolution, which stays on the axis; not used with a blade, a ring.
 

@@ -110,6 +110,7 @@ class Block:
         """The body, with a notch of this depth or none. Collective."""
         size, mouth = self.rule.size, self.rule.mouth
         sizes = {"dim": 2, "Lx": self.length, "H": self.depth + self.below, "notch": notch, "deep": self.depth + 0.5}
+        sizes["half"] = 1  # both sides of the crack are alike
         sizes |= {"lc": size, "band": 2 * size, "growth": 1.8, "entry": mouth}
         domain = read_geo(geometry("block"), COMM, sizes, gdim=2)
         viscosity = self.damping * self.solid.young

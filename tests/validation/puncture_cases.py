@@ -165,7 +165,7 @@ def closed_form(cut: Insertion, history: History, steady: SteadyCut, start: floa
     mesh, crack, (solid, *others) = cut.state.mesh, cut.body.cracks[0], cut.body.solids
     if mesh.geometry.dim != 3 or others:
         return {}
-    width = cut.symmetry_factor * np.ptp(cut.frame.span(mesh, cut.body.slit, cut.frame.edge))
+    width = (2 if cut.halved else 1) * np.ptp(cut.frame.span(mesh, cut.body.slit, cut.frame.edge))
     length = np.ptp(cut.frame.span(mesh, cut.body.domain.facets("bottom"), cut.frame.normal))
     viscous = cut.symmetry_factor * np.diff(np.interp([start, end], history["depth"], history["energy_viscous"]))[0]
     cost = crack.law.toughness + viscous / (end - start) / width
