@@ -81,13 +81,15 @@ Call Thicken;
 e = 1e-6 * H;
 near = axis > 0 || half ? 0 : -Lx;
 far = axis + Lx;
+If (!half)
+  name = "left"; box[] = {near, axis, -H, 0}; Call Cells;
+EndIf
 name = "right";     box[] = {axis, far, -H, 0};        Call Cells;
 name = "crack";     box[] = {axis, axis, -H, -notch};  Call Facets;
 name = "top_right"; box[] = {axis, far, 0, 0};         Call Facets;
 name = "bottom";    box[] = {near, far, -H, -H};       Call Facets;
 name = "far_right"; box[] = {far, far, -H, 0};         Call Facets;
 If (!half)
-  name = "left";     box[] = {near, axis, -H, 0}; Call Cells;
   name = "top_left"; box[] = {near, axis, 0, 0};  Call Facets;
   If (axis == 0)
     name = "far_left"; box[] = {-Lx, -Lx, -H, 0}; Call Facets;

@@ -82,13 +82,13 @@ behind = both * B;
 dim = 3;
 e = 1e-6 * H;
 near = half ? 0 : -L;
+If (!half)
+  name = "left";     box[] = {near, 0, -H, 0}; Call Cells;
+  name = "top_left"; box[] = {near, 0, 0, 0};  Call Facets;
+EndIf
 name = "right";     box[] = {0, L, -H, 0};      Call Cells;
 name = "top_right"; box[] = {0, L, 0, 0};       Call Facets;
 name = "bottom";    box[] = {near, L, -H, -H};  Call Facets;
-If (!half)
-  name = "left";     box[] = {-L, 0, -H, 0};  Call Cells;
-  name = "top_left"; box[] = {-L, 0, 0, 0};   Call Facets;
-EndIf
 If (both)
   sections[] = Surface In BoundingBox{-L - e, -H - e, -B - e, L + e, e, -B + e};
 EndIf

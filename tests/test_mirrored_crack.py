@@ -13,7 +13,10 @@ from cutsim import (
     Drive,
     Exponential,
     Faces,
+    Fixture,
     Insertion,
+    Layer,
+    LayeredBlock,
     Mechanics,
     NeoHookean,
     State,
@@ -21,6 +24,7 @@ from cutsim import (
     Support,
     cracked_block,
     geometry,
+    laminate,
     read_geo,
     run,
 )
@@ -190,6 +194,29 @@ def test_faces_that_are_not_firm_and_surfaces_that_meet():
     assert plain["crack_penetration"].max() > 0
     np.testing.assert_allclose(met["force"], plain["force"], rtol=1e-6)
     assert met["faces_pressed"].max() == 0
+
+
+@cache
+def drawn(half):
+    """Two layers, or one side of them, that are drawn apart at the ends and cut: the columns."""
+    bond = Exponential(strength=0.3, toughness=0.1)
+    layers = [Layer("film", 0.4, NeoHookean(1.0, 0.45), bond), Layer("base", 0.8, NeoHookean(0.777, 0.45), bond)]
+    thicknesses = {layer.name: layer.thickness for layer in layers}
+    domain = laminate(COMM, thicknesses, length=1.0, size=0.1, band=0.2, notch=0.3, half=half)
+    body = LayeredBlock.build(layers, domain, damping=0.005, faces=Faces(symmetric=True))
+    fixture = Fixture(ends=("far_right",) if half else ("far_left", "far_right"), drawn=0.05)
+    made = Insertion.build(body, Blade(np.radians(20), 0.1, 0.4), Drive(1.0), notch=0.3, fixture=fixture)
+    rows = []
+    control = StepControl.fixed(0.05)
+    run(made.mechanics, made.time_of(0.5), control, lambda r: rows.append(r.columns | made.columns(r.columns)))
+    return {name: np.array([row[name][0] for row in rows]) for name in rows[0]}
+
+
+def test_one_side_of_layers_that_are_drawn_apart():
+    both, one = drawn(0), drawn(1)
+    for name, share in {"force": 1, "cut": 1, "film_strain": 2, "base_fracture": 2, "work_external": 2}.items():
+        np.testing.assert_allclose(share * one[name], both[name], atol=1e-6 * np.abs(both[name]).max(), err_msg=name)
+    assert both["base_fracture"][-1] > 0
 
 
 @pytest.mark.mpi

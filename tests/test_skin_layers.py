@@ -322,6 +322,8 @@ def test_hypodermis_has_the_moduli_of_its_source():
         ({"least": 0}, "least"),
         ({"width": -1.0}, "width"),
         ({"width": 1.0, "rows": 0}, "rows"),
+        ({"half": 2}, "half"),
+        ({"half": 1, "thread": 0.1}, "half"),
     ],
 )
 def test_refuses_what_is_no_block(change, name):

@@ -85,7 +85,7 @@ def laminate(
     require("half", half, half == 0 or half == 1 and thread is None, "0 or 1, and 0 for a body of revolution")
     right = _graded(length, size, band, entry)
     bounds = -np.concatenate([[0.0], np.cumsum(list(layers.values()))])
-    left = -right[:0:-1] if not half else []
+    left = right[:0] if half else -right[:0:-1]
     across = np.concatenate([left, right]) if thread is None else np.append(0.0, thread + right)
     lines = [across, _down(bounds, size, notch, least, entry)[::-1]]
     if width is not None:
