@@ -86,14 +86,14 @@ If (!half)
 EndIf
 name = "right";     box[] = {axis, far, -H, 0};        Call Cells;
 name = "crack";     box[] = {axis, axis, -H, -notch};  Call Facets;
+If (!half)
+  name = "top_left"; box[] = {near, axis, 0, 0}; Call Facets;
+EndIf
 name = "top_right"; box[] = {axis, far, 0, 0};         Call Facets;
 name = "bottom";    box[] = {near, far, -H, -H};       Call Facets;
 name = "far_right"; box[] = {far, far, -H, 0};         Call Facets;
-If (!half)
-  name = "top_left"; box[] = {near, axis, 0, 0};  Call Facets;
-  If (axis == 0)
-    name = "far_left"; box[] = {-Lx, -Lx, -H, 0}; Call Facets;
-  EndIf
+If (axis == 0 && !half)
+  name = "far_left"; box[] = {-Lx, -Lx, -H, 0}; Call Facets;
 EndIf
 If (notch > 0)
   name = "notch"; box[] = {axis, axis, -notch, 0}; Call Facets;
