@@ -67,7 +67,7 @@ class Setting:
 
 
 THREAD = dict(r0=0.2, R=6, H=8, notch=0.5, deep=5, lc=0.05)
-BLOCK = dict(L=6, B=6, H=7.5, notch=1.0, slit=1.0, deep=6, band=0.75, lc=0.25, growth=1.6)
+BLOCK = dict(half=1, L=6, B=6, H=7.5, notch=1.0, slit=1.0, deep=6, band=0.75, lc=0.25, growth=1.6)
 SETTINGS = {
     # (dim, quick)
     (2, False): Setting("thread", THREAD, 15, 0.15, 0.5, 1.0, 0.1, 4.0, 0.1),
@@ -145,7 +145,7 @@ def summarise(cut: Insertion, history: History, parts: History, law: Exponential
         "toughness_given": law.toughness,
         "largest_force": float(history["force"].max()),
         "depth": float(history["depth"].max()),
-        "new_area": cut.symmetry_factor * float(history["crack_broken"].max()),
+        "new_area": (2 if cut.halved else 1) * float(history["crack_broken"].max()),
         **{f"{name.replace(' ', '_')}_at_the_end": float(part[-1]) for name, part in parts.items() if name != "depth"},
         "largest_closure": float(np.abs(history["energy_closure"]).max()),
         "steps": len(history["time"]),
@@ -198,7 +198,7 @@ def draw(cut: Insertion, out: Path) -> None:
         return
     box = (-3.0, 3.0, -depth - 1.5, 1.0, -3.0, 3.0)
     tool, across = tool_surface(cut), ((-1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    draw_stress(out / "section.png", cut.body.solids, tool=tool, window=box, view=(0.5, 0.5, -1.6))
+    draw_stress(out / "section.png", cut.body.solids, tool=tool, mirror=("x",), window=box, view=(0.5, 0.5, -1.6))
     draw_insertion(out / "crack.png", cut, mirror=("z",), clip=across, window=box, view=(-1.6, 0.3, 0.4))
 
 

@@ -110,7 +110,7 @@ class Block:
         """The body, with a notch of this depth or none. Collective."""
         size, mouth = self.rule.size, self.rule.mouth
         sizes = {"dim": 2, "Lx": self.length, "H": self.depth + self.below, "notch": notch, "deep": self.depth + 0.5}
-        sizes["half"] = 1  # both sides of the crack are alike
+        sizes["half"] = 1  # both sides of the crack are alike: energies are those of one
         sizes |= {"lc": size, "band": 2 * size, "growth": 1.8, "entry": mouth}
         domain = read_geo(geometry("block"), COMM, sizes, gdim=2)
         viscosity = self.damping * self.solid.young
@@ -217,7 +217,7 @@ def compared(block: Block, intact: History, notched: History) -> dict[str, float
     steady = [SteadyCut.of(history, start, end) for history in (intact, notched)]
     works = [work_until(intact["depth"][peak], history) for history in (intact, notched)]
     lost = intact["energy_fracture"] + intact["energy_friction"] + intact["energy_viscous"]
-    viscous = np.diff(np.interp([start, end], intact["depth"], intact["energy_viscous"]))[0] / block.steady
+    viscous = 2 * np.diff(np.interp([start, end], intact["depth"], intact["energy_viscous"]))[0] / block.steady
     expected = steady_force(block.bond.toughness + viscous, 1.0, block.stiffness)
     return {
         "steady force over that from a notch": steady[0].force / steady[1].force,
