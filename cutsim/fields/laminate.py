@@ -82,7 +82,7 @@ def laminate(
     require_number("rows", rows, count(1))
     require_number("thread", thread, positive.or_none)
     require("width", width, width is None or thread is None, "None for a body of revolution")
-    require("half", half, half == 0 or half == 1 and thread is None, "0 or 1, and 0 for a body of revolution")
+    require("half", half, half == 0 or (half == 1 and thread is None), "0 or 1, and 0 for a body of revolution")
     right = _graded(length, size, band, entry)
     bounds = -np.concatenate([[0.0], np.cumsum(list(layers.values()))])
     left = right[:0] if half else -right[:0:-1]
