@@ -29,6 +29,7 @@ from cutsim import (
     run,
 )
 from cutsim.base.compat import cell_partitioner
+from cutsim.cases import CaseError, read_case
 from cutsim.fields.temperature import Temperature
 from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.interface_heat import InterfaceHeat
@@ -219,6 +220,61 @@ def test_one_side_of_layers_that_are_drawn_apart():
     assert both["base_fracture"][-1] > 0
 
 
+CASE = """
+title = "Half a bar"
+[mesh]
+geometry = "block"
+dim = 2
+[mesh.set]
+half = 1
+Lx = 1.0
+H = 1.0
+lc = 0.5
+band = 0.5
+notch = 0
+[material]
+model = "neo-hookean"
+young = 1e4
+poisson = 0.0
+[law]
+model = "exponential"
+strength = 1.0
+toughness = 0.5
+[bodies.bar]
+cells = ["right"]
+[cracks.glue]
+facets = "crack"
+[supports.end]
+facets = "far_right"
+direction = "x"
+value = "0.2*t"
+[supports.bottom]
+facets = "bottom"
+direction = "y"
+[analysis]
+until = 1.0
+[steps]
+first = 0.05
+largest = 0.05
+"""
+
+
+def test_a_case_file_may_have_such_a_crack(tmp_path):
+    """Left out, `plus` says that the facets lie in a plane of symmetry; a bar that is stiff opens its bond by 2 u."""
+    path = tmp_path / "half.toml"
+    path.write_text(CASE)
+    simulation, rows = read_case(path).build(COMM), []
+    simulation.run(lambda report: rows.append(report.columns))
+    opening = rows[-1]["glue_opening"][0]
+    bond = Exponential(strength=1.0, toughness=0.5)
+    force = bond.strength * opening / bond.opening * np.exp(1 - opening / bond.opening)
+    assert opening == pytest.approx(0.4, rel=1e-3)
+    assert rows[-1]["end_force"][0] == pytest.approx(force, rel=1e-6)
+    path.write_text(CASE.replace("half = 1", "half = 0"))
+    with pytest.raises(CaseError, match=r"cracks.glue.plus"):
+        read_case(path).build(COMM)
+
+
 @pytest.mark.mpi
 def test_pictures_show_the_side_that_is_there():
     state, facets = half()
@@ -238,7 +294,7 @@ def test_refusals():
     with pytest.raises(ValueError, match=r"facets = .*plane of symmetry"):
         Crack(state, np.concatenate([facets, at(domain, 0, 0.0)]), None, **make)
     inner = mesh.locate_entities(domain, 1, lambda x: np.isclose(x[0], 0.5))
-    with pytest.raises(ValueError, match=r"facets = .*between two cells"):
+    with pytest.raises(ValueError, match=r"plus = None.*the cells of a side"):
         Crack(state, inner, None, **make)
     with pytest.raises(ValueError, match=r"friction = 0.3.*image"):
         Crack(state, facets, None, friction=0.3, **make)

@@ -170,7 +170,8 @@ class Domain:
     def split(self) -> list[Entities]:
         """Facets across which displacement and temperature may jump."""
         tables = self.tables
-        found = [self.facets(("cracks", name, "facets"), crack.facets) for name, crack in tables.cracks.items()]
+        cracks = [(name, crack) for name, crack in tables.cracks.items() if crack.plus is not None]
+        found = [self.facets(("cracks", name, "facets"), crack.facets) for name, crack in cracks]
         return found + ([self.facets(("mesh", "open"), tables.mesh.open)] if tables.mesh.open else [])
 
 

@@ -102,19 +102,23 @@ class Interface(Table):
     young: Annotated[Stress, POSITIVE] | None = None
 
 
+_Side = Annotated[Annotated[Group, Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM]
+
+
 class Crack(Interface):
     """Crack along facets of the mesh.
 
     Args:
         facets: Groups of facets.
-        plus: Group of cells on its '+' side, or a direction that points out of them.
+        plus: Group of cells on its '+' side, or a direction that points out of them. Left out for facets of the outer
+            boundary in a plane of symmetry: the other side is the image of the one that is meshed.
         normal: Normal of the "current" or of the "reference" configuration (small strain).
         closing: Whether closed faces press on the points that they met at the start. Faces that slide over each other
             need false, and a pair of the two, such as ``slave = "glue+"`` with ``master = "glue-"``.
     """
 
     facets: Groups
-    plus: Annotated[Annotated[Group, Tag("<single>")] | Annotated[tuple[Number, ...], Tag("<list>")], FORM]
+    plus: _Side | None = None
     normal: Literal["current", "reference"] = "current"
     closing: Flag = True
 

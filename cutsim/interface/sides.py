@@ -17,7 +17,7 @@ from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_n
 from cutsim.fields.crack_checks import check_cracked
 from cutsim.fields.faces import Face, rows
 from cutsim.fields.points import FacetPoints
-from cutsim.fields.space import crack_measure_entities
+from cutsim.fields.space import crack_measure_entities, on_boundary
 from cutsim.fields.state import State
 from cutsim.fields.twins import facet_nodes
 
@@ -139,6 +139,7 @@ class MirroredSide(Sides):
     share = 0.5
 
     def __init__(self, state: State, facets: Facets) -> None:
+        require("plus", None, on_boundary(state.mesh, facets), "the cells of a side, or a direction, within the mesh")
         self._face = Face.outer(state.mesh, facets)
         require(
             "facets", f"{len(facets)} on one rank", in_plane_of_symmetry(state, self._face), "in a plane of symmetry"
