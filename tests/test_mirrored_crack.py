@@ -35,6 +35,7 @@ from cutsim.heat.contact_heat import ContactHeat
 from cutsim.heat.interface_heat import InterfaceHeat
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.viscous import ViscousBond
+from cutsim.pairs.self_intersection import SelfIntersection
 from cutsim.results.grids import gather_facets
 from helpers.fields import smooth
 from helpers.laws import BILINEAR, EXPONENTIAL
@@ -90,7 +91,7 @@ def test_traction_is_that_of_the_jump_to_the_image(gdim):
     assert rows["energy_fracture"][-1] + rows["energy_cohesive_stored"][-1] == pytest.approx(0.5 * whole, rel=1e-6)
     assert rows["crack_opening"][-1] == pytest.approx(0.4)
     assert np.abs(rows["energy_closure"]).max() < 2e-3
-    assert crack.faces.sides.share == 0.5 and crack.mirrored and len(crack.meshed) == 1
+    assert crack.faces.sides.share == 0.5 and crack.plane is not None and len(crack.meshed) == 1
 
 
 def test_a_closed_crack_presses_on_its_image():
@@ -151,6 +152,25 @@ def test_tangent(gdim, opening):
     assert_slope_two(crack, state, base, 0.2 * size, linear=opening < 0)
     if opening > 0:  # it softens with the damage
         assert_slope_two(crack.viscosity, state, base, 0.2 * size, linear=opening < 1)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("gdim", [2, 3])
+def test_what_comes_beyond_the_plane_passes_through_its_image(gdim):
+    """The mesh has one element of 0.5 across: a half of it is allowed, as elsewhere."""
+    state, facets = half(gdim)
+    crack = Crack(state, facets, None, EXPONENTIAL, young=2.0)
+    look = SelfIntersection(state, [crack.plane])
+
+    def moved(by):
+        state.u.interpolate(lambda x: np.array([*[0 * x[0]] * (gdim - 1), 0 * x[0] + by]))
+        state.u.x.scatter_forward()
+        return look.found()
+
+    assert moved(0.2) is None
+    found = moved(0.3)
+    assert found is not None and found.depth == pytest.approx(0.6) and found.place[-1] == pytest.approx(0.8)
+    assert found.cells.all()
 
 
 # -- cuts -------------------------------------------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from cutsim.analysis.doubts import doubt_distortions
-from cutsim.base.terms import Distorted, Term, offering
+from cutsim.base.terms import Bonded, Distorted, Term, offering
 from cutsim.fields.state import State
 from cutsim.pairs.self_intersection import SelfIntersection
 
@@ -22,7 +22,8 @@ class Distortions:
     def __init__(self, state: State, terms: Sequence[Term]) -> None:
         self._state, self._bodies = state, offering(terms, Distorted)
         self._worst = state.memory.value("mechanics: worst distortions", Found())
-        self._intersection = SelfIntersection(state)
+        planes = [crack.plane for crack in offering(terms, Bonded) if crack.plane is not None]
+        self._intersection = SelfIntersection(state, planes)
 
     def watch(self, scale: float) -> None:
         """Doubt what may change more of the work than may be missing in the audit. Collective.

@@ -334,6 +334,10 @@ class Bonded(Protocol):
         """Local facets, ghosts included."""
 
     @property
+    def plane(self) -> Any:
+        """Plane of symmetry in which it lies, `cutsim.fields.symmetry.SymmetryPlane`; None if both sides are meshed."""
+
+    @property
     def meshed(self) -> Sequence[Any]:
         """Those of the two faces that are meshed, as `cutsim.fields.faces.Face`. Collective."""
 

@@ -81,7 +81,7 @@ def _pair(
 ) -> SurfacePair:
     key = ("pairs", name)
     if table.automatic:
-        closing = [(c.face("+"), c.face("-")) for c in cracks.values() if c.closing and not c.mirrored]
+        closing = [(c.face("+"), c.face("-")) for c in cracks.values() if c.closing and c.plane is None]
         surfaces = ContactSurfaces.automatic(solids, closing=closing)
         sides: list[Sequence[Face]] = [surfaces.faces, ()]
         young = surfaces.young

@@ -52,7 +52,7 @@ def check_cracks(state: State, cracks: Sequence[Bonded], pairs: Sequence[Joining
         ValueError: Two cracks share a facet, or faces of a crack press on each other and are surfaces of a pair, too,
             or a pair leaves this to a crack that does not.
     """
-    inner = [crack for crack in cracks if len(crack.meshed) == 2]  # faces in a plane of symmetry also meet others
+    inner = [crack for crack in cracks if crack.plane is None]  # faces in a plane of symmetry also meet others
     pressing = np.concatenate([np.empty(0, dtype=np.int32), *(c.facets for c in inner if c.closing)])
     for pair in pairs:
         if state.mesh.comm.allreduce(len(np.setdiff1d(pair.closed_elsewhere, pressing))):

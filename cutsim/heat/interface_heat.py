@@ -55,7 +55,7 @@ class InterfaceHeat(ExchangeTerm):
     ) -> None:
         super().__init__(temperature, name or crack.name)
         require("crack", crack.name, crack.state is temperature.state, "a crack made with the state of the temperature")
-        require("crack", crack.name, len(crack.meshed) == 2, "one of which both sides are meshed")
+        require("crack", crack.name, crack.plane is None, "one of which both sides are meshed")
         require("temperature", crack.name, _is_cracked(temperature.space, crack), "on a space cracked along the crack")
         self.crack, self.law, self.friction = crack, law, friction or crack.friction
         T = temperature.value

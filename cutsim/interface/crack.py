@@ -21,6 +21,7 @@ from cutsim.fields.faces import Face
 from cutsim.fields.points import Surface, Values
 from cutsim.fields.sizes import facet_size, largest_extent, normal_size
 from cutsim.fields.state import State
+from cutsim.fields.symmetry import SymmetryPlane
 from cutsim.interface.cohesive import CohesiveLaw
 from cutsim.interface.contact import PenaltyContact
 from cutsim.interface.crack_faces import CrackFaces
@@ -31,7 +32,7 @@ from cutsim.interface.history import InterfaceHistory
 from cutsim.interface.path_measure import PathMeasure
 from cutsim.interface.point_fields import PointFields
 from cutsim.interface.rubbing import AnyFriction, check_friction
-from cutsim.interface.sides import MirroredSide, sides_of
+from cutsim.interface.sides import sides_of
 from cutsim.interface.viscous import ViscousBond
 
 #: Fields of a crack for output.
@@ -124,9 +125,9 @@ class Crack(PointFields):
         return self.points.median(facet_size(self.state.mesh, self.points.facets))
 
     @property
-    def mirrored(self) -> bool:
-        """Whether only one side is meshed, and the other one is its image."""
-        return isinstance(self.faces.sides, MirroredSide)
+    def plane(self) -> SymmetryPlane | None:
+        """Plane of symmetry in which it lies; None if both sides are meshed."""
+        return self.faces.sides.plane
 
     @property
     def companions(self) -> Sequence[Term]:

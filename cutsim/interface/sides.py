@@ -6,12 +6,9 @@ from typing import Literal
 
 import numpy as np
 import ufl
-from dolfinx.mesh import Mesh, compute_midpoints
-from mpi4py import MPI
 from numpy.typing import NDArray
 from ufl.geometry import FacetJacobian
 
-from cutsim.base.arrays import Array
 from cutsim.base.checks import require
 from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
 from cutsim.fields.crack_checks import check_cracked
@@ -19,11 +16,9 @@ from cutsim.fields.faces import Face, rows
 from cutsim.fields.points import FacetPoints
 from cutsim.fields.space import crack_measure_entities, on_boundary
 from cutsim.fields.state import State
-from cutsim.fields.twins import facet_nodes
+from cutsim.fields.symmetry import SymmetryPlane
 
 Facets = NDArray[np.int32]
-# distance from a plane that is none, over the size of the facets together
-_FLAT = 1e-6
 
 
 class Sides(ABC):
@@ -38,9 +33,11 @@ class Sides(ABC):
         points: The points.
         entities: The rows.
         share: Part of the energy of the crack that belongs to what is meshed.
+        plane: Plane of symmetry in which it lies; None if both sides are meshed.
     """
 
     share = 1.0
+    plane: SymmetryPlane | None = None
 
     def __init__(self, state: State, points: FacetPoints, entities: NDArray[np.int32]) -> None:
         self._state, self.points, self.entities = state, points, entities
@@ -141,9 +138,8 @@ class MirroredSide(Sides):
     def __init__(self, state: State, facets: Facets) -> None:
         require("plus", None, on_boundary(state.mesh, facets), "the cells of a side, or a direction, within the mesh")
         self._face = Face.outer(state.mesh, facets)
-        require(
-            "facets", f"{len(facets)} on one rank", in_plane_of_symmetry(state, self._face), "in a plane of symmetry"
-        )
+        self.plane = SymmetryPlane.of(state, self._face)
+        require("facets", f"{len(facets)} on one rank", self.plane is not None, "in a plane of symmetry")
         points = FacetPoints(state.mesh, self._face.facets, state.measures.face(self._face), interior=False)
         owned = state.mesh.topology.index_map(state.mesh.topology.dim).size_local
         super().__init__(state, points, rows([self._face], owned).ravel())
@@ -179,31 +175,3 @@ class MirroredSide(Sides):
 def sides_of(state: State, facets: Facets, plus: Facets | Sequence[float] | None, name: str, *, current: bool) -> Sides:
     """The sides of a crack; arguments as for `TwoSides`, plus=None if one of them is the image of the other."""
     return MirroredSide(state, facets) if plus is None else TwoSides(state, facets, plus, name, current=current)
-
-
-def in_plane_of_symmetry(state: State, face: Face) -> bool:
-    """Whether facets lie in one plane with the body on one side, in which it can be mirrored. Collective.
-
-    The plane of a body of revolution is normal to its axis.
-    """
-    mesh, comm = state.mesh, state.mesh.comm
-    gdim = mesh.geometry.dim
-    x = mesh.geometry.x[facet_nodes(mesh, face.facets), :gdim]
-    x = x - comm.allreduce(x.sum(axis=0)) / comm.allreduce(len(x))
-    normal = np.linalg.eigh(comm.allreduce(x.T @ x))[1][:, 0]
-    size = comm.allreduce(np.abs(x).max(initial=0.0), MPI.MAX)
-    off = comm.allreduce(np.abs(x @ normal).max(initial=0.0), MPI.MAX)
-    ahead = (_inward(mesh, face) @ normal > 0).sum()
-    ahead, there = comm.allreduce(np.array([ahead, len(face.cells)]))
-    upright = not state.axisymmetric or abs(normal[0]) <= _FLAT
-    return bool(off <= _FLAT * size and ahead in (0, there) and upright)
-
-
-def _inward(mesh: Mesh, face: Face) -> Array:
-    """From the middles of facets to those of their cells [length]."""
-    (cells, facets), gdim = (face.cells, face.facets), mesh.geometry.dim
-    of_cells, of_facets = (
-        compute_midpoints(mesh, mesh.topology.dim - i, entities).reshape(-1, 3)
-        for i, entities in enumerate((cells, facets))
-    )
-    return np.asarray((of_cells - of_facets)[:, :gdim])

@@ -1,5 +1,6 @@
 """Bodies whose surface passes through itself, where no contact resists."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,6 +15,7 @@ from cutsim.base.compat import geometry_nodes
 from cutsim.fields.faces import Face
 from cutsim.fields.pieces import mesh_pieces
 from cutsim.fields.state import State
+from cutsim.fields.symmetry import SymmetryPlane
 from cutsim.interface.doubts import DEEP
 from cutsim.pairs.contact_surfaces import all_faces
 from cutsim.pairs.outer_surface import OuterSurface, SharedSurface
@@ -96,10 +98,11 @@ class SelfIntersection:
 
     Args:
         state: Displacement and time.
+        planes: Planes of symmetry, beyond which the body meets its image.
     """
 
-    def __init__(self, state: State) -> None:
-        self._state = state
+    def __init__(self, state: State, planes: Sequence[SymmetryPlane] = ()) -> None:
+        self._state, self._planes = state, planes
 
     def found(self) -> Intersection | None:
         """Where the surface lies in its own body by more than a part of an element now; None if nowhere. Collective."""
@@ -124,11 +127,14 @@ class SelfIntersection:
             within[some] = np.maximum(within[some], here)
         deepest = int(within.argmax()) if len(within) else None
         mine = (0.0, []) if deepest is None else (-float(within[deepest]), points[inside[deepest]].tolist())
-        depth, where = min(mesh.comm.allgather(mine))
+        beyond = np.max([np.zeros(len(points)), *(plane.beyond(points) for plane in self._planes)], axis=0)
+        crossing = int(beyond.argmax())
+        depth, where = min(*mesh.comm.allgather(mine), (-float(beyond[crossing]), points[crossing].tolist()))
         if -depth <= DEEP:
             return None
         deep = within > DEEP
-        nodes = np.unique(np.concatenate(mesh.comm.allgather(self._nodes.numbers[inside[deep]])))
+        found = [self._nodes.numbers[beyond > DEEP], *mesh.comm.allgather(self._nodes.numbers[inside[deep]])]
+        nodes = np.unique(np.concatenate(found))
         taken = np.isin(cells.numbers, nodes).any(axis=1)
         taken[rows[deep]] = True
         return Intersection(-depth, where, taken)

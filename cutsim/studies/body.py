@@ -108,7 +108,7 @@ class Faces:
 
     def guides(self, cracks: Sequence[Crack]) -> tuple[Guide, ...]:
         """What keeps the middle of some cracks in their plane, where both sides are meshed."""
-        return tuple(Guide(crack) for crack in cracks if not crack.mirrored) if self.symmetric else ()
+        return tuple(Guide(crack) for crack in cracks if crack.plane is None) if self.symmetric else ()
 
     @property
     def _pressing(self) -> bool:
@@ -127,7 +127,7 @@ class Faces:
         """
         if self.automatic:
             alone = [crack for crack in cracks if crack.closing]
-            closing = [(crack.face("+"), crack.face("-")) for crack in alone if not crack.mirrored]
+            closing = [(crack.face("+"), crack.face("-")) for crack in alone if crack.plane is None]
             options: dict[str, Any] = {"friction": self.friction, "name": "faces"}
             if alone:  # what folds is as small as the elements along the cut, and most of the surface is coarser
                 young, size = min(crack.young for crack in cracks), min(crack.normal_size for crack in cracks)
@@ -191,7 +191,7 @@ class CrackedBody:
     @property
     def mirrored(self) -> bool:
         """Whether only one side of the crack is meshed, and the other one is its image."""
-        return self.cracks[0].mirrored
+        return self.cracks[0].plane is not None
 
     def columns(self, columns: Columns) -> Columns:
         """What a body has to say for the history, none by itself. Collective."""
