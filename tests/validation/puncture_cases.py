@@ -166,7 +166,9 @@ def closed_form(cut: Insertion, history: History, steady: SteadyCut, start: floa
     if mesh.geometry.dim != 3 or others:
         return {}
     width = (2 if cut.halved else 1) * np.ptp(cut.frame.span(mesh, cut.body.slit, cut.frame.edge))
-    length = np.ptp(cut.frame.span(mesh, cut.body.domain.facets("bottom"), cut.frame.normal))
+    length = (2 if cut.body.mirrored else 1) * np.ptp(
+        cut.frame.span(mesh, cut.body.domain.facets("bottom"), cut.frame.normal)
+    )
     viscous = cut.symmetry_factor * np.diff(np.interp([start, end], history["depth"], history["energy_viscous"]))[0]
     cost = crack.law.toughness + viscous / (end - start) / width
     force = steady_force(cost, width, solid.material.young * length * width)
