@@ -200,7 +200,7 @@ def test_one_side_is_cut_as_the_whole(dim, notch):
     """The same force, areas and openings, half of the energies."""
     depth = 0.6 if notch else 0.4
     (whole, both), (part, one) = (cut(side, notch, dim, depth, symmetric=True) for side in (0, 1))
-    assert part.symmetry_factor == 2 * whole.symmetry_factor and part.halved == whole.halved
+    assert part.symmetry_factor == 2 * whole.symmetry_factor and part.edge_factor == whole.edge_factor
     assert part.state.unknowns < 0.55 * whole.state.unknowns
     for name in ("force", "tip_force", "tip_friction", "cut", "front", "spent", "crack_opening", "crack_broken"):
         np.testing.assert_allclose(one[name], both[name], atol=1e-6 * np.abs(both[name]).max(), err_msg=name)

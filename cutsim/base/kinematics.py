@@ -101,10 +101,17 @@ def surface_frame(u: Expr, mesh: Any, n: Expr, *, current: bool) -> tuple[Expr, 
         One unit vector in 2-D, two in 3-D, for use on interior facets.
     """
     if len(n) == 2:
-        return (ufl.as_vector([-n[1], n[0]]),)
+        return tangents(n)
     edge = FacetJacobian(mesh)("+")[:, 0]
     if current:
         edge = edge + 0.5 * (ufl.grad(u)("+") + ufl.grad(u)("-")) * edge
+    return tangents(n, edge)
+
+
+def tangents(n: Expr, edge: Expr | None = None) -> tuple[Expr, ...]:
+    """Unit tangents that complete a unit normal: one in 2-D, in 3-D two of which the first is along an edge."""
+    if edge is None:
+        return (ufl.as_vector([-n[1], n[0]]),)
     first = edge / ufl.sqrt(ufl.dot(edge, edge))
     return first, ufl.cross(n, first)
 

@@ -142,7 +142,7 @@ def _mirror(cut: Insertion) -> tuple[str, ...]:
     """Planes of symmetry of an insertion into a part of a body, if axes are normal to them."""
     frame = cut.frame
     planes = [frame.normal] if cut.body.mirrored else []
-    if cut.halved and frame.edge is not None:
+    if cut.edge_factor == 2 and frame.edge is not None:
         planes.append(frame.edge)
     return tuple(axis for n in planes for axis, along in zip("xyz", n, strict=False) if abs(along) == 1)
 

@@ -137,12 +137,18 @@ def crack_measure_entities(mesh: Mesh, facets: Facets, plus: NDArray[np.int32] |
 
 def on_boundary(mesh: Mesh, facets: NDArray[np.int32]) -> bool:
     """Whether facets lie on the outer boundary, all of them, and are not twins of others on it. Collective."""
-    outer = np.zeros(_facet_map(mesh).size_local + _facet_map(mesh).num_ghosts, dtype=np.int32)
-    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+    facets = np.asarray(facets, dtype=np.int32)
+    inner = mesh.comm.allreduce(int(np.count_nonzero(~outer_marks(mesh)[facets])))
+    return inner == 0 and not split_along(mesh, facets)
+
+
+def outer_marks(mesh: Mesh) -> NDArray[np.bool_]:
+    """Whether each local facet, ghosts included, lies on the outer boundary. Collective."""
+    facet_map, fdim = _facet_map(mesh), mesh.topology.dim - 1
+    mesh.topology.create_connectivity(fdim, fdim + 1)
+    outer = np.zeros(facet_map.size_local + facet_map.num_ghosts, dtype=np.int32)
     outer[exterior_facet_indices(mesh.topology)] = 1
-    outer = sum_over_ranks(_facet_map(mesh), outer)
-    inner = mesh.comm.allreduce(int((outer[np.asarray(facets, dtype=np.int32)] == 0).sum()))
-    return inner == 0 and not split_along(mesh, np.asarray(facets, dtype=np.int32))
+    return sum_over_ranks(facet_map, outer) > 0
 
 
 def locate_dofs(V: fem.FunctionSpace, dim: int, entities: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -8,7 +8,7 @@ from dolfinx.mesh import compute_midpoints
 from mpi4py import MPI
 
 from cutsim.base.arrays import Array
-from cutsim.fields.faces import Face
+from cutsim.fields.faces import Face, mean_size
 from cutsim.fields.sizes import normal_size
 from cutsim.fields.state import State
 from cutsim.fields.twins import facet_nodes
@@ -50,11 +50,9 @@ class SymmetryPlane:
         )
         behind, there = comm.allreduce(np.array([((cells - facets) @ normal < 0).sum(), len(cells)]))
         upright = not state.axisymmetric or abs(normal[0]) <= _FLAT
-        sizes = normal_size(mesh, face.facets)
-        size = comm.allreduce(sizes.sum()) / there
         if off > _FLAT * extent or behind not in (0, there) or not upright:
             return None
-        return cls(point, normal if behind else -normal, float(size))
+        return cls(point, normal if behind else -normal, mean_size(mesh, [face], normal_size))
 
     def beyond(self, x: Array) -> Array:
         """How far points lie beyond the plane, in elements [–]."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ufl.geometry import FacetJacobian
 
 from cutsim.base.checks import require
-from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame
+from cutsim.base.kinematics import Expr, displacement_jump, facing, midsurface_normal, surface_frame, tangents
 from cutsim.fields.crack_checks import check_cracked
 from cutsim.fields.faces import Face, rows
 from cutsim.fields.points import FacetPoints
@@ -63,14 +63,13 @@ class Sides(ABC):
     def frame(self, u: Expr) -> tuple[Expr, ...]:
         """Unit tangents that turn with the crack, one in 2-D, two in 3-D."""
 
+    @abstractmethod
     def face(self, side: Literal["+", "-"]) -> Face:
         """One of the faces. Collective.
 
         Raises:
             ValueError: It is not meshed.
         """
-        require("side", side, side in ("+", "-")[: len(self.meshed)], "'+', or '-' where both sides are meshed")
-        return self.meshed["+-".index(side)]
 
 
 class TwoSides(Sides):
@@ -99,8 +98,11 @@ class TwoSides(Sides):
     @property
     def meshed(self) -> tuple[Face, ...]:
         """Both faces. Collective."""
-        mesh = self._state.mesh
-        return Face.of_rows(mesh, self.entities, "+"), Face.of_rows(mesh, self.entities, "-")
+        return self.face("+"), self.face("-")
+
+    def face(self, side: Literal["+", "-"]) -> Face:
+        """One of the faces. Collective."""
+        return Face.of_rows(self._state.mesh, self.entities, side)
 
     def jump(self, u: Expr) -> Expr:
         """Jump u⁻ − u⁺ of a displacement."""
@@ -150,6 +152,11 @@ class MirroredSide(Sides):
         """The '+' face."""
         return (self._face,)
 
+    def face(self, side: Literal["+", "-"]) -> Face:
+        """The '+' face; the other one is not meshed."""
+        require("side", side, side == "+", "'+': the other side is an image")
+        return self._face
+
     def jump(self, u: Expr) -> Expr:
         """Jump −2 (u·N) N from a displacement to that of the image."""
         return -2 * ufl.dot(u, self._N) * self._N
@@ -164,12 +171,7 @@ class MirroredSide(Sides):
 
     def frame(self, u: Expr) -> tuple[Expr, ...]:
         """Unit tangents of the plane."""
-        n = self._N
-        if len(n) == 2:
-            return (ufl.as_vector([-n[1], n[0]]),)
-        edge = FacetJacobian(self._state.mesh)[:, 0]
-        first = edge / ufl.sqrt(ufl.dot(edge, edge))
-        return first, ufl.cross(n, first)
+        return tangents(self._N, FacetJacobian(self._state.mesh)[:, 0] if len(self._N) == 3 else None)
 
 
 def sides_of(state: State, facets: Facets, plus: Facets | Sequence[float] | None, name: str, *, current: bool) -> Sides:

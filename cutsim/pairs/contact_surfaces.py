@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from dolfinx.mesh import exterior_facet_indices
 from numpy.typing import NDArray
 
 from cutsim.base.checks import positive, require, require_number
@@ -13,7 +12,7 @@ from cutsim.base.signatures import checked
 from cutsim.base.units import Stress
 from cutsim.bodies.solid import Solid
 from cutsim.fields.faces import Face
-from cutsim.fields.space import CRACKED, marks, sum_over_ranks
+from cutsim.fields.space import CRACKED, marks, outer_marks, sum_over_ranks
 from cutsim.fields.state import State
 from cutsim.pairs.surface_pair import SurfacePair
 
@@ -89,13 +88,10 @@ def all_faces(state: State, without: NDArray[np.int32] | None = None) -> tuple[F
         ValueError: What is left out is no facet of the mesh.
     """
     mesh, tdim = state.mesh, state.mesh.topology.dim
-    mesh.topology.create_connectivity(tdim - 1, tdim)
-    facet_map = mesh.topology.index_map(tdim - 1)
-    outer = np.zeros(facet_map.size_local + facet_map.num_ghosts, dtype=np.int32)
-    outer[exterior_facet_indices(mesh.topology)] = 1
+    outer, facet_map = outer_marks(mesh), mesh.topology.index_map(tdim - 1)
     cracked = vars(state.V).get(CRACKED, np.zeros(len(outer), dtype=bool))
     named = np.empty(0, dtype=np.int32) if without is None else np.asarray(without, dtype=np.int32)
     left = ~marks(mesh.comm, facet_map, named, "without")
     cut = np.flatnonzero((cracked & left)[: facet_map.size_local]).astype(np.int32)
-    surface = np.flatnonzero((sum_over_ranks(facet_map, outer) > 0) & left).astype(np.int32)
+    surface = np.flatnonzero(outer & left).astype(np.int32)
     return Face.outer(mesh, surface), *Face.both(mesh, cut)

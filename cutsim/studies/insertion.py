@@ -140,9 +140,9 @@ class Insertion:
         return self.body.state
 
     @property
-    def halved(self) -> bool:
-        """Whether a plane of symmetry halves body and tool along the edge."""
-        return self.symmetry_factor == (4 if self.body.mirrored else 2)
+    def edge_factor(self) -> float:
+        """Factor from what is meshed to the whole along the edge, and of areas of the crack."""
+        return self.symmetry_factor / 2 if self.body.mirrored else self.symmetry_factor
 
     @property
     def depth(self) -> float:
@@ -171,17 +171,16 @@ class Insertion:
         point by the share of that work that belongs to its largest opening so far, and never falls.  What the body
         says of itself, such as the energies of its layers, follows.
         """
-        factor, kind = self.symmetry_factor, self.state.facet_measure
-        whole = factor / 2 if self.body.mirrored else factor  # its plane does not halve the crack in it
+        factor, along, kind = self.symmetry_factor, self.edge_factor, self.state.facet_measure
         force = -factor * float(sum(contact.force() for contact in self.contacts) @ self.frame.push)
         reaction = factor * self.reaction()
         rows: Columns = {
             "depth": (self.depth, "length"),
             "force": (force, "force"),
             "imbalance": (abs(reaction - force) / abs(force) if force else 0.0, "one"),
-            "cut": (whole * sum(area.spent() for area in self.areas), kind),
-            "front": (whole * sum(area.swept() for area in self.areas), kind),
-            "spent": (whole * sum(c.points.integral(c.point_values("spent")) for c in self.body.cracks), kind),
+            "cut": (along * sum(area.spent() for area in self.areas), kind),
+            "front": (along * sum(area.swept() for area in self.areas), kind),
+            "spent": (along * sum(c.points.integral(c.point_values("spent")) for c in self.body.cracks), kind),
         }
         for part in PARTS:
             rows[f"{part}_force"] = (factor * self.parts.force(part), "force")

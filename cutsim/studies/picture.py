@@ -54,6 +54,6 @@ def tool_surface(cut: Insertion) -> pyvista.PolyData | None:
     if cut.tool.round:
         return revolved(outline, tip, axes)
     low, high = frame.span(cut.state.mesh, cut.body.slit, edge)
-    if cut.halved:  # the origin lies in the plane of symmetry
+    if cut.edge_factor == 2:  # the origin lies in the plane of symmetry
         low, high = np.array([-1, 1]) * max(-low, high)
     return prism(outline, tip + low * edge, axes, (high - low) * edge)

@@ -145,7 +145,7 @@ def summarise(cut: Insertion, history: History, parts: History, law: Exponential
         "toughness_given": law.toughness,
         "largest_force": float(history["force"].max()),
         "depth": float(history["depth"].max()),
-        "new_area": (2 if cut.halved else 1) * float(history["crack_broken"].max()),
+        "new_area": cut.edge_factor * float(history["crack_broken"].max()),
         **{f"{name.replace(' ', '_')}_at_the_end": float(part[-1]) for name, part in parts.items() if name != "depth"},
         "largest_closure": float(np.abs(history["energy_closure"]).max()),
         "steps": len(history["time"]),

@@ -165,7 +165,7 @@ def closed_form(cut: Insertion, history: History, steady: SteadyCut, start: floa
     mesh, crack, (solid, *others) = cut.state.mesh, cut.body.cracks[0], cut.body.solids
     if mesh.geometry.dim != 3 or others:
         return {}
-    width = (2 if cut.halved else 1) * np.ptp(cut.frame.span(mesh, cut.body.slit, cut.frame.edge))
+    width = cut.edge_factor * np.ptp(cut.frame.span(mesh, cut.body.slit, cut.frame.edge))
     length = (2 if cut.body.mirrored else 1) * np.ptp(
         cut.frame.span(mesh, cut.body.domain.facets("bottom"), cut.frame.normal)
     )
